@@ -118,9 +118,7 @@ class DraftCacheStore(CacheStore):
 
     @cached_property
     def _target(self) -> tuple[SurfaceCells, NDArray[np.bool_]]:
-        """The cells of the light, which are coarse enough, and the mask of those in or near the
-        view.
-        """
+        """The cells of the light, and the mask of those in or near the view."""
         return self.cells, cells_near(self.cells, self._seen, VIEW_MARGIN)
 
     def forget_cells(self) -> None:
@@ -140,9 +138,7 @@ def _same(one: list[Piece], other: list[Piece]) -> bool:
 
 
 def _apart(one: list[Piece], other: list[Piece]) -> float:
-    """Return the largest distance (mm) between corresponding vertices; infinite if the faces
-    differ.
-    """
+    """Return the largest distance (mm) between vertices; infinite if the faces differ."""
     if len(one) != len(other):
         return np.inf
     farthest = 0.0

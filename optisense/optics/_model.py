@@ -351,9 +351,7 @@ class OpticalModel(RayModel):
         pressed: PressedSkin | None,
         camera: RayCamera,
     ) -> tuple[NDArray[np.float32], MarkerPlaces]:
-        """Return the factors (h, w, 3) by which the markers darken each pixel, and the markers'
-        positions.
-        """
+        """Return the factors (h, w, 3) by which markers darken pixels, and the markers' places."""
         markers = self._design.markers
         assert markers is not None
         points = seen.astype(np.float64)

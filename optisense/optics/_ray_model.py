@@ -300,11 +300,7 @@ class RayModel:
 
 
 def _refuse_impossible_kinds(design: SensorDesign, before: SensorDesign | None) -> None:
-    """Raise DesignError or LibraryError if an emitter, material or another kind can't be simulated.
-
-    Args:
-        before: a design whose values can be; only those that differ are checked.
-    """
+    """Raise an error if a value that is not that of the design ``before`` can't be simulated."""
     raise_problems(kind_problems(design, before), f"design '{design.name}'")
     lens = design.camera.distortion
     if lens is not None and (before is None or before.camera.distortion != lens):

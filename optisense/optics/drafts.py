@@ -64,9 +64,7 @@ about 10 MB of meshes."""
 
 @dataclass(frozen=True)
 class _Shown:
-    """The last draft with its arguments; ``kept`` tells whether it reused layers, media or cells
-    of an earlier draft.
-    """
+    """The last draft, its arguments, and whether it reused data of earlier drafts (``kept``)."""
 
     contacts: tuple[Contact, ...]
     asked: tuple[Any, ...]
@@ -201,9 +199,7 @@ class DraftModel(OpticalModel):
     def _carried_view(
         self, contacts: Sequence[Contact], resolution: tuple[int, int] | None, skin: str
     ) -> ContactView | None:
-        """Return the view with the skin as the contacts deformed it in an earlier draft, moved
-        along with a cage by little; None if there is none.
-        """
+        """Return the view whose deformed skin moved along with a cage by little; None if none."""
         if not self._faint or self._last_view is None or self._pressed is None or skin != ELASTIC:
             return None
         old, now = self._pressed.skin, self.sensing
@@ -224,9 +220,7 @@ class DraftModel(OpticalModel):
         return ContactView(camera, last.placed, pressed, scenes, rays, mesh)
 
     def _are_same(self, contacts: tuple[Contact, ...]) -> bool:
-        """Return whether contacts are those of the last draft, perhaps carried by a skin that was
-        bent since.
-        """
+        """Return whether contacts are the last ones, perhaps carried along by a bent skin."""
         assert self._shown is not None
         if contacts == self._shown.contacts:
             return True
@@ -244,9 +238,7 @@ class DraftModel(OpticalModel):
         return self._draft_store is not None and self._draft_store.has_old_cells
 
     def _resolve(self) -> None:
-        """Resolve media that were only moved along with bent parts, and divide bent surfaces into
-        cells.
-        """
+        """Resolve media that were only moved with bent parts, and divide bent skins into cells."""
         store = self._draft_store
         if store is not None and store.has_old_cells:
             store.forget_cells()
@@ -279,11 +271,7 @@ class DraftModel(OpticalModel):
         return DraftCacheStore(lit, rays.points[rays.hit], before)
 
     def _straightened(self, design: SensorDesign) -> SensorDesign:
-        """Return the same sensor with bent meshes instead of cages.
-
-        Meshes that did not move are the same objects as before, by which a model recognises the
-        data that it can reuse.
-        """
+        """Return the sensor with bent meshes for cages; unmoved meshes are the same objects."""
         shapes = design.deformed_meshes()
         for name, mesh in shapes.items():
             known = self._bent.get(name)
@@ -302,9 +290,7 @@ class DraftModel(OpticalModel):
 
 
 def _all_but_lights_same(one: SensorDesign, other: SensorDesign) -> bool:
-    """Return whether designs have the same meshes (the same objects) and values, except for lights
-    and what no picture shows.
-    """
+    """Return whether designs have the same mesh objects and visible values except for lights."""
     return one.meshes == other.meshes and all(
         getattr(one, field) == getattr(other, field)
         for field in SensorDesign.model_fields.keys() - NOT_SHOWN - {"lights"}
@@ -317,9 +303,7 @@ def _same_picture(one: SensorDesign, other: SensorDesign) -> bool:
 
 
 def _moved(one: SensorDesign, other: SensorDesign) -> frozenset[int] | None:
-    """Return the numbers of the light groups that differ in more than flux and colour; None if
-    anything other than lights differs.
-    """
+    """Return the numbers of groups whose lights moved; None if more than the lights differs."""
     if list(one.lights) != list(other.lights) or not _all_but_lights_same(one, other):
         return None
     pairs = zip(one.lights.values(), other.lights.values(), strict=True)

@@ -230,9 +230,7 @@ def _entries(
 def _lines_with_noise(
     lines: dict[Line, NDArray[np.float64]], emitted: float
 ) -> Iterator[tuple[Line, tuple[float, float, float]]]:
-    """Yield the power (mW), share and noise of lines that are not empty, computed from their
-    batches.
-    """
+    """Yield power (mW), share and noise of the lines that are not empty, from their batches."""
     for line, batches in lines.items():
         power = float(batches.mean())
         if power != 0.0:
@@ -241,9 +239,7 @@ def _lines_with_noise(
 
 
 def _face_owner(piece: Piece) -> str:
-    """Return the name of the solid that a surface belongs to, or of its faces if the design names
-    them.
-    """
+    """Return the name of a surface's solid, or of its faces if the design names them."""
     solids, _, rest = piece.name.partition("|")
     frosted = rest.partition(":")[2]
     return frosted or solids.split("/")[0]
@@ -308,9 +304,7 @@ def _together(names: list[str]) -> str:
 
 
 def _names(piece: Piece) -> tuple[str, str, tuple[str, LightEnd]]:
-    """Return the names of the solid behind a surface, of the medium in front of it, and of the part
-    that absorbs at it.
-    """
+    """Return the solid behind a surface, the medium in front, and the part that absorbs at it."""
     kind = piece.surface.kind
     if kind is SurfaceKind.LIGHT:
         return "a light", "front of a light", ("absorbed by lights", LightEnd.PART)

@@ -206,9 +206,7 @@ def _longest(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
 def _quarters(
     triangles: NDArray[np.float64], sides: NDArray[np.float64], disc: Disc
 ) -> NDArray[np.float64]:
-    """Divide triangles that are larger than the disc's radius into quarters, and drop those that
-    are far away.
-    """
+    """Divide triangles larger than the disc's radius into quarters, and drop those far away."""
     a, b, c = np.moveaxis(triangles[sides > disc.radius], 1, 0)
     ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
     pieces = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]

@@ -61,8 +61,8 @@ def joined(first: Value, second: Value) -> Value:
 def _joined(
     first: Value, second: Value, number: mi.UInt32, later: mi.UInt32, in_first: mi.Bool
 ) -> Value:
-    """Return the entries ``number`` (n,) of the first array where ``in_first``, and the entries
-    ``later`` (n,) of the second elsewhere.
+    """Return entries ``number`` of the first array where ``in_first``, else ``later`` of the
+    second.
     """
     if isinstance(first, tuple) and isinstance(second, tuple):
         pairs = zip(first, second, strict=True)
@@ -90,9 +90,7 @@ def indices(values: NDArray[np.integer] | NDArray[np.bool_]) -> mi.UInt32:
 
 
 def _copied(kind: type[Value], values: NDArray[Any]) -> Value:
-    """Return a device array that has memory of its own, with the bits of an array (n,) of numbers
-    of four bytes.
-    """
+    """Return a device array of its own memory with the bits of four-byte numbers (n,)."""
     bits = np.ascontiguousarray(values).view(np.uint32)
     if len(bits) == 0:
         return dr.zeros(kind, 0)

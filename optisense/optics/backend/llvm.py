@@ -201,10 +201,7 @@ def load_atomic() -> None:
 
 
 def _environment_folders() -> list[Path]:
-    """Return the library folders of a virtual environment and of the one that it was made from.
-
-    Packages such as conda's libllvm19 and libgcc install libraries there.
-    """
+    """Return the library folders of an environment (of conda, too) and of the one below it."""
     return [Path(prefix) / "lib" for prefix in dict.fromkeys((sys.prefix, sys.base_prefix))]
 
 

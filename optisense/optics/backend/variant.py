@@ -208,11 +208,7 @@ def _kernel_child(variant: str) -> None:
 
 
 def _prepare_llvm() -> None:
-    """Find libLLVM before Dr.Jit is imported; if it already is, check the one that it has loaded.
-
-    Raises:
-        SetupError: no libLLVM is found, or the loaded one is too old.
-    """
+    """Find libLLVM before Dr.Jit is imported, or raise SetupError if the loaded one is too old."""
     if "drjit" not in sys.modules:
         find_llvm()
         return

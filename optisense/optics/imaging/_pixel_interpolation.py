@@ -85,9 +85,7 @@ Place = tuple[slice, slice]
 
 
 def _places(image: NDArray[np.generic]) -> Iterator[tuple[Place, list[Place]]]:
-    """Yield slices of the pixels of an image (h, w) with odd column, odd row, or both, and of the
-    even pixels beside each.
-    """
+    """Yield slices of pixels with odd column, odd row, or both, and of the even ones beside."""
     height, width = ((size + 1) // 2 for size in image.shape)
     for down, right in ((0, 1), (1, 0), (1, 1)):
         rows, columns = height - down, width - right

@@ -127,13 +127,7 @@ def _directions(rays: float, pixels: NDArray[np.bool_], count: int) -> int:
 
 
 def _lobe_samples(plan: SamplingPlan, regions: PixelRegions, photons: int) -> list[LobeSamples]:
-    """Return the samples of an image.
-
-    Args:
-        plan: the pixels that are shaded, and their camera samples.
-        regions: the pixels in contacts, around them, and far from them.
-        photons: number of photons of the cache.
-    """
+    """Return the samples of an image from a cache of a number of photons."""
     tiers = plan.of_contacts(regions) if regions.near.any() else []
     if plan.only_contacts:
         rays = SCORE_RAYS * photons
@@ -273,11 +267,7 @@ class _Image:
     seed: int
 
     def add(self, samples: LobeSamples, earlier: int) -> None:
-        """Add one pass of samples.
-
-        Args:
-            earlier: number of earlier passes.
-        """
+        """Add the samples of one pass, which follows a number of ``earlier`` ones."""
         scene, film, seed = self.scenes.full, self.film, self.seed
         pixel, number = repeated(samples.pixels, samples.count)
         later = number + dr.opaque(mi.UInt32, earlier * samples.count)
@@ -312,11 +302,7 @@ def _lit_rays(rays: LobeRays, groups: int) -> mi.UInt32:
 def _add_light(
     film: Film, rays: LobeRays, seen: VisiblePoints, table: mi.Float, share: float
 ) -> None:
-    """Add the light that arrives along rays to the pixels that drew them.
-
-    Args:
-        share: inverse of the number of rays of each sample.
-    """
+    """Add the light that arrives along rays to their pixels, times ``share``, that of one ray."""
     lit = _lit_rays(rays, film.groups)
     if dr.width(lit) < FEWEST_LANES:
         return
@@ -334,9 +320,7 @@ def _add_light(
 def _reflected(
     points: VisiblePoints, coating: CoatingBsdf, direction: mi.Vector3f, whole: mi.Bool
 ) -> mi.Color3f:
-    """Return the BSDF times the cosine (3, n) of the peak of the lobe alone, or of the ``whole``
-    coating, for light that arrives from unit directions.
-    """
+    """Return the BSDF times the cosine (3, n) of a lobe's peak or of the ``whole`` coating."""
     peak = evaluate_peak(coating, points.normal, direction, points.towards_eye)
     every = evaluate_coating(coating, points.normal, direction, points.towards_eye)
     return dr.select(whole, every, peak)

@@ -170,9 +170,7 @@ class _Shading:
         return self.film.averaged_layers(*self.size, smooth, deblurred=True)
 
     def reflections(self) -> NDArray[np.float32]:
-        """Return the layers of the light that interfaces reflect to the camera; zero if it is
-        known as faint light.
-        """
+        """Return the layers of reflections at interfaces; zero if they are known as faint light."""
         if self.faint_known:
             return np.zeros((self.film.groups, *self.size[::-1], 3), dtype=np.float32)
         return self.mirrored.layers(*self.size)
@@ -196,7 +194,6 @@ class _Shading:
         """Shade one camera sample of each pixel, and add it to the films.
 
         Args:
-            pixel: (n,) indices of the pixels.
             number: (n,) number of each sample in its pixel.
             in_contacts: whether the light between contacts and skin is sampled.
             again: whether the pixels have been sampled before; their reflections are kept.
@@ -238,9 +235,7 @@ class _Shading:
         again: bool,
         channel: int | None,
     ) -> tuple[VisiblePoints, VisiblePoints | None]:
-        """Return the main and the reflected visible points of samples, from the known view if it
-        has them; see `sample`.
-        """
+        """Return main and reflected visible points of samples, known ones if there are any."""
         known = None if self.known is None or again else self.known.points
         key = in_contacts, self._sparse, channel
         points = None if known is None else known.get(key)
@@ -330,9 +325,7 @@ class _Shading:
         return layers, reflections
 
     def _sample_apart(self, apart: NDArray[np.bool_], grain: NDArray[np.bool_]) -> None:
-        """Sample the middle of the pixels (h, w) whose neighbours differ, and a further place where
-        their neighbours were resampled because of grain.
-        """
+        """Sample pixels (h, w) whose neighbours differ: the middle, and again where grainy."""
         width, height = self.size
         again = apart & np.kron(grain[::2, ::2], np.ones((2, 2), bool))[:height, :width]
         tiers = [repeated(each, 1) for each in (apart, again) if each.any()]

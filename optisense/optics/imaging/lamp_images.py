@@ -108,9 +108,7 @@ class LampImages:
     def _traced(
         self, camera: RayCamera, pixels: NDArray[np.bool_], paths: int, seed: int
     ) -> tuple[NDArray[np.float32], NDArray[np.floating]]:
-        """Return the layers (groups, h, w, 3) of the lamps that paths through a mask (h, w) of
-        pixels meet, and the number (h, w) of these paths.
-        """
+        """Return the lamps' layers (groups, h, w, 3) by paths through pixels, and their number."""
         pixel, number = repeated(pixels, paths)
         dr.eval(pixel, number)
         spots = film_samples(pixel, camera.width, number, seed)

@@ -188,9 +188,7 @@ def _covered(radius: FloatArray, beside: FloatArray) -> FloatArray:
 
 
 def _between_pixels(values: FloatArray, places: FloatArray) -> FloatArray:
-    """Return the values (n, k) of a map (h, w, k) at columns and rows (n, 2), interpolated between
-    the middles of pixels; those of the nearest pixel where a neighbour has none.
-    """
+    """Interpolate a map (h, w, k) at columns and rows (n, 2); beside gaps, take the nearest."""
     upright = np.moveaxis(values, 2, 0)
     spots = places[:, ::-1].T - 0.5
     found = [

@@ -119,9 +119,7 @@ class SamplingPlan:
 
 
 def _samples_of_large_contacts(width: int) -> tuple[int, int]:
-    """Return the numbers of samples per pixel in and around contacts of many pixels, in an image
-    ``width`` pixels wide.
-    """
+    """Return the samples per pixel in and around large contacts in an image of a width."""
     share = min(1.0, REFERENCE_WIDTH / width)
     return max(2, round(CONTACT_SAMPLES * share)), max(2, round(RIM_SAMPLES * share))
 

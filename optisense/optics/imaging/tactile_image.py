@@ -239,9 +239,7 @@ def _marker_table(markers: MarkerPlaces) -> str:
 
 
 def _layers_before(folder: Path) -> set[str]:
-    """Return the names of the layers that an earlier image wrote into a folder, from its
-    run.json.
-    """
+    """Return the layers' names in the run.json that an earlier image wrote into a folder."""
     try:
         names = read_json(folder / "run.json", OutputError)["layers"]
         return {name for name in names if re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name)}
@@ -254,9 +252,7 @@ def _is_power(values: NDArray[Any]) -> bool:
 
 
 def _scaled(layer: NDArray[np.float32], factors: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return a layer (h, w, 3) times factors (3,); multiplying rows is several times faster than
-    pixels.
-    """
+    """Return a layer (h, w, 3) times factors (3,), by rows, which is several times faster."""
     height, width = layer.shape[:2]
     row = np.tile(np.broadcast_to(factors, 3), width)
     return (layer.reshape(height, -1) * row).reshape(layer.shape)

@@ -97,15 +97,13 @@ def follow_to_coating(
 def _scattered(
     scene: RayScene, paths: Paths, lanes: mi.UInt32, bits: mi.UInt32
 ) -> tuple[PathEnd, mi.UInt32]:
-    """Follow several rays from each rough interface before which paths have stopped.
+    """Follow several rays, evenly spread, from each rough interface before which paths have
+    stopped.
 
-    All of them bring the light of lamps, and only the first that of coatings. The directions of the
-    rays of one path are spread evenly over the lobes of the interface, by which the noise of the
-    contact of GelSight Mini of specularity 1 is a tenth lower.
+    All of them bring the light of lamps, and only the first that of coatings.
 
     Args:
         lanes: numbers (k,) of the stopped paths.
-        bits: random bits (n,) of each path.
     """
     stopped = dr.width(lanes)
     copies = max(1, min(MOST_SCATTERED, round(dr.width(bits) / stopped)))
@@ -158,11 +156,9 @@ def drawn(
 
 
 def _first_above(rising: mi.Float, values: mi.Float) -> mi.UInt32:
-    """Return the index (m,) of the first entry of rising numbers (n,) that is greater than each of
-    the values (m,), or that of the last entry.
+    """Return the index (m,) of the first of rising numbers (n,) above each value (m,), or the last.
 
-    Unlike that of `drjit.binary_search`, the kernel does not depend on n, so that it is compiled
-    once.
+    Unlike that of `drjit.binary_search`, the kernel does not depend on n.
     """
 
     def halved(first: mi.UInt32, last: mi.UInt32) -> tuple[mi.UInt32, mi.UInt32]:

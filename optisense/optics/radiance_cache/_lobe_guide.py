@@ -157,8 +157,7 @@ def _choose(
 
     Args:
         per_weight: number (n,) of slots for a weight of 1.
-        found: mask of the points with beams.
-        lane: numbers of the points.
+        found: mask of the points with beams, whose numbers are ``lane``.
         slots: the numbers of the beams; they are set.
     """
     running = unit_float(next_random(at.seen.random ^ GOLDEN_BITS))
@@ -175,10 +174,9 @@ def _choose(
 
 
 def _weight(beams: Beams, number: mi.UInt32, at: ShadingPoints) -> mi.Float:
-    """Return about how much light (n,) of beams the peaks of lobes reflect.
+    """Return about how much light (n,) of beams lobes' peaks reflect, Fresnel reflectance left out.
 
-    The Fresnel reflectance of the metal, which hardly varies, is left out. A beam counts if the
-    light at one standard deviation from its mean direction is in the peak.
+    A beam counts if the light at one standard deviation from its mean direction is in the peak.
     """
     towards, cosine, flux, tag = beam_at(beams, number)
     cosine = beams.widened(cosine, tag)

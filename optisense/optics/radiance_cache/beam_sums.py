@@ -152,9 +152,7 @@ def _reflected(
     cosine: mi.Float,
     tag: mi.UInt32,
 ) -> mi.Color3f:
-    """Return the radiance (3, n) that coatings reflect towards the camera of beams of unit flux
-    density.
-    """
+    """Return the radiance (3, n) that coatings reflect of beams of unit flux density."""
     normal, towards_eye = at.seen.normal, at.seen.towards_eye
     if not at.coating.metallic:
         coating = broadened_coating(at.coating, cosine)

@@ -182,12 +182,8 @@ def _reflected(
     """Return the radiance that the coating reflects towards the camera of a beam of unit flux
     density.
 
-    Coatings with narrow lobes see the beam as two discs.
-
     Args:
-        light: the binned light that the beam belongs to.
-        cosine: mean cosine of the beam.
-        half_width: half-width of the distribution of the beam's cosine with the normal.
+        cosine, half_width: middle and half-width of the distribution of the beam's cosine.
     """
     points = at.seen
     if at.coating.only_tail:
@@ -204,13 +200,10 @@ def _reflected(
 
 
 def _shorter_path_factor(scenes: ContactScenes, height: mi.Float, sine: mi.Float) -> mi.Color3f:
-    """Return the factor by which light is stronger on an indenter, as its path through the gel is
-    shorter.
+    """Return by how much light is stronger at a height (mm) above the skin, in an absorbing gel.
 
     Args:
-        scenes: the scenes, in a gel that absorbs.
-        height: height (mm) of the point above the undeformed surface; up to 0, it has no effect.
-        sine: sine of the light's elevation above that surface.
+        sine: sine of the light's elevation above the undeformed surface.
     """
     shortened = dr.maximum(height, 0) / dr.maximum(sine, MIN_SINE)
     return dr.exp(scenes.absorption * shortened)

@@ -120,10 +120,7 @@ def glossy_interreflection(
 def _secondary_hits(
     cache: RadianceCache, scenes: ContactScenes, at: ShadingPoints
 ) -> _SecondaryHits | None:
-    """Return the places that one ray from each point meets, drawn from its coating's lobes.
-
-    Rays that meet the skin are left out where the cache holds its light.
-    """
+    """Return places that one ray of each lobe meets, off the skin whose light the cache holds."""
     assert scenes.indenters is not None
     indenters, fixed, points = scenes.indenters, scenes.fixed, at.seen
     u = unit_float(points.series + points.number * STEPS_2D[0])
@@ -179,9 +176,7 @@ def _secondary_hits(
 def _shading_points(
     cache: RadianceCache, scenes: ContactScenes, seen: _SecondaryHits
 ) -> ShadingPoints:
-    """Return the shading points of places; each reads the cache below it, along the skin's
-    normal.
-    """
+    """Return the shading points of places; each reads the cache below it along the normal."""
     points = seen.points
     foot = foot_of(cache.binned.cells, seen.near, points.point, points.valid)
     base = dr.select(seen.raised, foot, points.point)
@@ -200,9 +195,7 @@ def _shading_points(
 
 
 def _light_of(cache: RadianceCache, scenes: ContactScenes, at: ShadingPoints) -> list[mi.Color3f]:
-    """Return the light (3, n) of the cache that places reflect towards the points that see them,
-    for each light group.
-    """
+    """Return, by group, the light (3, n) of the cache that places reflect to their observers."""
     horizon = occluder_horizon(
         scenes.balls,
         dr.opaque(mi.UInt32, dr.width(scenes.balls) // 4),

@@ -164,9 +164,7 @@ class Kernels:
         return (identity(self.cells.cells) + scale - scale @ blur @ diags(self.cells.areas)).tocsr()
 
     def _second_moment(self, kernel: csr_matrix) -> FloatingArray:
-        """Return the mean squared distance (cells,), mm^2, over which a kernel spreads light. That
-        of Epanechnikov's kernel is a third of its squared radius if it holds many cells.
-        """
+        """Return the mean squared distance (cells,), mm^2, over which a kernel spreads light."""
         centres, areas = self.cells.centres - self.cells.centres.mean(axis=0), self.cells.areas
         means = kernel @ (centres * areas[:, None])
         squares = kernel @ ((centres**2).sum(axis=1) * areas)

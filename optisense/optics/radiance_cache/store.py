@@ -161,13 +161,10 @@ class CacheStore:
         return 2 * self._tally_bytes(bins, self.cell_size * self._scale) < MAX_TALLY_BYTES
 
     def _planes(self, photons: int) -> int:
-        """Return the number of planes in which light is tallied.
+        """Return the number of planes in which light is tallied until a number of photons.
 
         Above curved surfaces the raised plane is only worth its time where the blur of the
         smoothing and of the bins exceeds the noise: the light takes 1.2 times as long with it.
-
-        Args:
-            photons: number of photons at which tracing ends.
         """
         if not self._raises or self._directions.fine:
             return 1
@@ -253,9 +250,7 @@ class CacheStore:
 
     @cached_property
     def _target(self) -> tuple[SurfaceCells, NDArray[np.bool_]]:
-        """Coarse cells over all opaque surfaces, and the mask (cells,) of those in or near the
-        view.
-        """
+        """Coarse cells of all opaque surfaces, and the mask of those in or near the view."""
         cells = build_cells(*self._opaque_mesh, PILOT_CELL_SIZE)
         return cells, cells_near(cells, self._seen, VIEW_MARGIN)
 
@@ -355,9 +350,7 @@ class CacheStore:
         return self._done[name], False
 
     def _tally(self, key: _Traced, passes: Passes, continues: bool) -> CacheTally:
-        """Return the tally to which photons are added: that of an earlier call if it ``continues``
-        and has no more than the wanted passes, else an empty one.
-        """
+        """Return an earlier tally if it ``continues`` and has no more passes, else an empty one."""
         planes = self._planes(passes.most * passes.photons)
         tally = self._running.get(key)
         if tally is None or not continues or tally.planes != planes or tally.passes > passes.most:
@@ -382,9 +375,7 @@ class CacheStore:
         limits: TracingLimits,
         on_stage: StageCallback,
     ) -> Iterator[float | None]:
-        """Trace passes until a limit is reached; yield the relative noise after each, if it is
-        known.
-        """
+        """Trace passes until a limit is reached; yield the noise after each, or None."""
         noise, next_check = None, 1
         if tally.passes < passes.most:
             self.guide  # noqa: B018  learned before photons are counted

@@ -115,13 +115,7 @@ class CacheTally:
         dr.eval(self.landed, self.halves, self.above_surface)
 
     def _tally(self, photons: PhotonMap, tables: Tables, flux_layer: FluxLayer | None) -> None:
-        """Add photons to tables.
-
-        Args:
-            photons: the photons that landed, or that crossed the flux layer.
-            tables: the sums that are added to.
-            flux_layer: the layer that the photons crossed; None if they landed.
-        """
+        """Add photons that landed, or that crossed a flux layer, to tables."""
         index = dr.arange(mi.UInt32, photons.count)
         place = dr.gather(mi.Vector4f, photons.place, index)
         travel = dr.gather(mi.Vector4f, photons.travel, index)
@@ -203,9 +197,7 @@ class CacheTally:
         return noise_of_worst_places(*self._light_and_variance(), near, areas, kernel)
 
     def _light_and_variance(self) -> tuple[FloatingArray, FloatingArray]:
-        """Return the smoothed irradiance (cells, groups), mW/mm^2, and its squared standard
-        deviation.
-        """
+        """Return the smoothed irradiance (cells, groups), mW/mm^2, and its variance."""
         kernel = self._smoothing()
         means = [kernel.kernel @ landed for landed in self._landed()[0]]
         if kernel.correction is not None:
@@ -214,8 +206,8 @@ class CacheTally:
         return (means[0] + means[1]) / 2, ((means[0] - means[1]) / 2) ** 2
 
     def _products(self, tables: Tables, kernel: Smoothing, used: NDArray[np.integer]) -> Tables:
-        """Return the smoothed light of the bins ``used``, in which the blur is undone: in each bin
-        by itself where the kernel has a correction, else by one factor for each cell and group.
+        """Return the smoothed light of the bins ``used``, deblurred by bins if the kernel has a
+        correction, else by one factor for each cell and group.
         """
         cells, count = self.cells.cells, self.directions.count
         once = (kernel.kernel / self.passes).astype(np.float32)
@@ -249,9 +241,7 @@ class CacheTally:
         return self.kernels.smoothing(self.photons, self.directions.corrected or dense)
 
     def _landed(self) -> FloatingArray:
-        """Return the power (planes, 2, cells, groups), mW, of the photons of even and odd number in
-        each cell of each plane.
-        """
+        """Return the power (planes, 2, cells, groups), mW, of photons of even and odd number."""
         halves = np.asarray(self.halves, dtype=np.float64) * (2 / self.passes)
         return halves.reshape(self.planes, 2, -1, self.groups)
 

@@ -181,9 +181,7 @@ class LobeTracer:
         return LobeGuide.of(self.cache.beams, light.groups, at, bin_axis(light.cells, 2))
 
     def _is_uncached(self, first: VisiblePoints, ray: Ray) -> mi.Bool:
-        """Return a mask of the rays that meet a coating before any interface, from which no light
-        arrives that the cache holds.
-        """
+        """Return a mask of rays that meet, before interfaces, coatings without cached light."""
         scenes = self.scenes
         table = scenes.full.table
         hit = scenes.full.intersect(ray)
@@ -209,9 +207,7 @@ class LobeTracer:
         """Add the light that arrives along rays to ``found``.
 
         Args:
-            bits: random bits (n,) of each ray.
-            second: points (2, n) of the unit square, spread evenly over the rays of a pixel, that
-                choose the directions of the rays from the first skin that they meet.
+            second: points (2, n) of the unit square that choose the directions from the first skin.
             traced: share (3, n) of the reflected light of each ray that the cache does not hold if
                 it comes from skin or lamps; None if no light of mirrored indenters is added.
             gathers: as in `trace`. Rays whose light is read on the skin go on, in the whole lobe,
@@ -391,21 +387,14 @@ class LobeTracer:
 
 
 def _on_indenter(table: mi.Float, end: PathEnd) -> mi.Bool:
-    """Return a mask (n,) of the ends on indenters, without those on skin that is bent beside them,
-    whose light hardly differs from that of the skin at rest.
-    """
+    """Return a mask (n,) of the ends on indenters; skin bent beside them counts as at rest."""
     return end.valid & (surface_region(table, end.surface, end.valid) == int(Region.INDENTER))
 
 
 def _reflected(
     table: mi.Float, end: PathEnd, only_peak: mi.Bool, place: mi.Point2f
 ) -> tuple[Ray, mi.Color3f]:
-    """Return rays that go on in the metallic lobes of coatings, and their weights (3, n).
-
-    Args:
-        only_peak: mask of the lobes of which only the peak counts, as the cache serves the tail.
-        place: points of the unit square that choose the directions.
-    """
+    """Return rays of metallic lobes (of the peak where ``only_peak``), and their weights (3, n)."""
     coating = coating_of(table, end.surface, end.valid)
     direction, share = sample_coating(coating, end.normal, -end.towards_eye, mi.Float(0), place)
     weight = end.weight * share * coating.specularity

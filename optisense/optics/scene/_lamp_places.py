@@ -120,9 +120,7 @@ def with_media(emitters: Sequence[Emitter], solids: Sequence[Solid]) -> list[Emi
 
 
 def _solids_before(lights: Sequence[Emitter], solids: Sequence[Solid]) -> list[NDArray[np.int64]]:
-    """Return the numbers (k,) of the solids in front of the `_looked_up` places of each of n
-    lights; -1 for air.
-    """
+    """Return the solids (k,) before the `_looked_up` places of n lights; -1 for air."""
     points, aside = [], []
     for lamp in lights:
         s, t, direction = lamp.frame
@@ -140,8 +138,7 @@ def _solids_before(lights: Sequence[Emitter], solids: Sequence[Solid]) -> list[N
 @lru_cache
 def _looked_up(shape: EmitterShape) -> FloatingArray:
     """Return the places (k, 2) on a window, in half widths and heights, at which its media are
-    looked up: the middles of its cells. On a disc, those beyond it are moved inward, as photons
-    start in parts of some of these cells.
+    looked up: the middles of its cells, on a disc moved inward.
     """
     if shape is EmitterShape.POINT:
         return np.zeros((1, 2))

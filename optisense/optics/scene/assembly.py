@@ -303,17 +303,13 @@ def _interface_surface(face: Interface) -> Surface:
 
 
 def _refracting_sheet(medium: Medium, design: SensorDesign) -> Surface:
-    """Return the surface of a refracting sheet; the medium behind it is unknown and absorbs
-    nothing.
-    """
+    """Return the surface of a refracting sheet; the unknown medium behind it absorbs nothing."""
     etas = medium.indices if design.dispersion else None
     return Surface(SurfaceKind.DIELECTRIC, eta=medium.ior, alpha=medium.roughness, etas=etas)
 
 
 def _merged(mesh: TriangleMesh) -> TriangleMesh:
-    """Return a mesh with its flat facets merged into few triangles, which saves time in tracing and
-    in comparisons.
-    """
+    """Return a mesh with flat facets merged into few triangles, which are traced faster."""
     smooth = mesh if mesh.normals is not None else mesh.vertex_normals()
     assert smooth.normals is not None
     bend = np.abs(smooth.normals[smooth.faces] - smooth.face_normals[:, None]).max(axis=(1, 2))

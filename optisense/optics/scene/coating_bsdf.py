@@ -106,9 +106,7 @@ def fresnel_metal(cosine: mi.Float, eta: mi.Color3f, k: mi.Color3f) -> mi.Color3
 def _facet_density(
     coating: CoatingBsdf, normal: mi.Vector3f, half: mi.Vector3f, towards_light: mi.Vector3f
 ) -> mi.Float:
-    """Return the GGX distribution at half vectors, averaged over the disc of light if there is
-    one.
-    """
+    """Return the GGX distribution at half vectors, averaged over the disc of light if any."""
     cos_m = dr.dot(half, normal)
     if coating.light_radius2 is None:
         return ggx(cos_m, coating.alpha)

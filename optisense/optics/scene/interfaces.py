@@ -60,11 +60,9 @@ def ggx_of_disc(
 
 
 def _half_vector_disc(cos_m: mi.Float, cos_d: mi.Float, light_radius2: mi.Float) -> mi.Float:
-    """Return the squared radius (n,) of a disc of half vectors, seen along the normal; see
-    `ggx_of_disc`.
+    """Return the squared radius (n,) of a disc of half vectors, seen along the normal.
 
-    The solid angle of half vectors is that of the light over 4 cos_d; seen along the normal, it
-    shrinks by cos_m.
+    Their solid angle is that of the light over 4 cos_d; seen along the normal, it shrinks by cos_m.
     """
     return light_radius2 * cos_m / (4 * dr.maximum(cos_d, MIN_DISC_COSINE))
 

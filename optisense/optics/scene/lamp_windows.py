@@ -136,10 +136,7 @@ class LampWindows:
     def _intensity(
         self, profile: mi.UInt32, cosine: mi.Float, angle: mi.Float, active: mi.Bool
     ) -> mi.Float:
-        """Return the intensity (n,) of tables, linear between the entries of the grid.
-
-        ``angle`` is the angle (n,) from the width axis, radians.
-        """
+        """Return the intensity (n,) of tables at an angle (radians) from the width axis."""
         up = dr.safe_acos(cosine) * (POLAR_STEPS / dr.pi)
         turn = angle * (AZIMUTH_STEPS / dr.two_pi)
         turn = dr.select(turn < 0, turn + AZIMUTH_STEPS, turn)
@@ -194,9 +191,7 @@ def _corners(emitter: Emitter) -> FloatingArray:
 
 
 def _grid(intensity: Intensity) -> FloatingArray:
-    """Return the intensity (AZIMUTH_STEPS + 1, POLAR_STEPS + 1), 1/sr, of a power of 1, over the
-    angle from the width axis and the polar angle.
-    """
+    """Return the intensity (azimuths, polar angles), 1/sr, of a power of 1 on a grid of angles."""
     polar = np.linspace(0, 180, POLAR_STEPS + 1)
     turn = np.linspace(0, 360, AZIMUTH_STEPS + 1)
     values = intensity.at(*np.broadcast_arrays(polar, turn[:, None] - UP_TURN))

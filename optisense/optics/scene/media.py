@@ -254,9 +254,7 @@ def same_faces(one: TriangleMesh, other: TriangleMesh) -> bool:
 
 
 def _refracts(interface: Interface) -> bool:
-    """Return whether an interface affects light: whether the index or the absorption changes
-    there.
-    """
+    """Return whether the index or the absorption changes at an interface."""
     step = abs(interface.ior_inside - interface.ior_outside)
     if interface.etas is not None:
         step = max(step, *(abs(eta - 1.0) for eta in interface.etas))
@@ -309,9 +307,7 @@ def _alike(one: Solid, other: Solid) -> bool:
 
 
 def _grown(solid: Solid, room: float) -> Solid:
-    """Return a solid grown by ``room`` (mm), so that faces that are coplanar up to rounding are cut
-    cleanly.
-    """
+    """Return a solid grown by ``room`` (mm), by which nearly coplanar faces are cut cleanly."""
     mesh = solid.mesh.welded()
     normal = mesh.face_normals
     sums, rights = np.zeros((len(mesh.vertices), 3, 3)), np.zeros((len(mesh.vertices), 3))

@@ -277,9 +277,7 @@ class SensorScenes:
         )
 
     def _absorption(self) -> mi.Color3f | None:
-        """Absorption coefficient (1/mm, per channel) of the gel in front of the sensing surface;
-        None if it is clear.
-        """
+        """Absorption (1/mm, per channel) of the gel before the sensing surface; None if clear."""
         absorption = self.assembly.absorption_before
         return dr.opaque(mi.Color3f, absorption) if max(absorption) > 0.0 else None
 
@@ -290,8 +288,6 @@ def _for_renderer(scenes: ContactScenes) -> ContactScenes:
 
 
 def _indenters(number: int, placed: tuple[TriangleMesh, ...]) -> RayScene:
-    """Return the scene of indenters alone, whose coating has the given number in the table of
-    surfaces.
-    """
+    """Return the scene of indenters alone, whose coating has a number in the surfaces' table."""
     pieces = [indenter_piece(mesh, PILOT_COATING) for mesh in placed]
     return RayScene(pieces, [number] * len(pieces))

@@ -107,9 +107,7 @@ def _extent(pieces: Sequence[Piece]) -> float | None:
 def _twice_areas(
     vertices: FloatingArray, faces: NDArray[np.integer]
 ) -> tuple[FloatingArray, FloatingArray]:
-    """Return the normals (m, 3) of faces with lengths of twice their areas (mm^2), and these
-    lengths (m,).
-    """
+    """Return normals (m, 3) as long as twice the faces' areas (mm^2), and these lengths (m,)."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     cross = np.cross(b - a, c - a)
     return cross, np.linalg.norm(cross, axis=1)
@@ -184,8 +182,7 @@ def _growth(
     """Return the coefficients (m, 2) of `SurfaceCells.offset_growth` for each face.
 
     Args:
-        corners: (m, 3, 3) corners, mm.
-        normals: (m, 3, 3) unit normals of the surface at the corners.
+        corners, normals: (m, 3, 3) corners, mm, and unit normals of the surface there.
         upright: (m, 3) unit normals of the faces.
     """
     side, other = (corners[:, k] - corners[:, 0] for k in (1, 2))
@@ -205,9 +202,7 @@ def _means(
     normals: FloatingArray,
     areas: FloatingArray,
 ) -> tuple[FloatingArray, FloatingArray, FloatingArray]:
-    """Return area (cells,), centre (cells, 3) and mean unit normal (cells, 3) of cells, whose
-    samples `owner` tells.
-    """
+    """Return areas (cells,), centres (cells, 3) and mean unit normals (cells, 3) of samples."""
 
     def total(values: FloatingArray) -> FloatingArray:
         return np.asarray(np.bincount(owner, values, cells), dtype=np.float64)
@@ -273,9 +268,7 @@ def _divided(
 
 
 def _index(used: NDArray[np.int64], counts: NDArray[np.int64]) -> NDArray[np.uint32]:
-    """Return the number + 1 of the nearest cell of each grid place within SEARCH_CELLS places, else
-    0.
-    """
+    """Return the number + 1 of the nearest cell to each grid place within SEARCH_CELLS, else 0."""
     numbers = np.zeros(int(np.prod(counts)), dtype=np.uint32)
     numbers[used] = np.arange(len(used)) + 1
     grid = numbers.reshape(counts[::-1])

@@ -218,9 +218,7 @@ def _nearest_edges(
     rows: IntArray,
     count: int,
 ) -> tuple[IntArray, IntArray, IntArray]:
-    """Return the cause, first and second (see `Edges`) for pairs of rays that meet different
-    patches.
-    """
+    """Return cause, first and second (see `Edges`) for pairs of rays on different patches."""
     origin = np.asarray(stop.origin, dtype=np.float64).T
     direction = np.asarray(stop.direction, dtype=np.float64).T
     distance = np.where(valid, np.asarray(stop.distance, dtype=np.float64), np.inf)

@@ -77,9 +77,7 @@ class LedgerSums:
 
 @dataclass
 class _Sums:
-    """Device arrays of `LedgerSums`, in double precision, the number of surfaces, and that with the
-    additional rows of the lights.
-    """
+    """Device arrays of `LedgerSums` in double precision, and the number of surfaces and rows."""
 
     power: mi.Float64
     rest: mi.Float64
@@ -90,26 +88,13 @@ class _Sums:
     def record(
         self, line: mi.UInt32, surface: mi.UInt32, fate: mi.UInt32, what: mi.Color3f, where: mi.Bool
     ) -> None:
-        """Add power to rows; symbolic loops may call it.
-
-        Args:
-            line: the number of batch and group.
-            surface: the number of the surface.
-            fate: a value of `Fate`.
-            what: power (mW) per channel.
-            where: mask of the lanes that count.
-        """
+        """Add power (mW per channel) to rows where a mask says so, also in symbolic loops."""
         row = (line * self.rows + surface) * FATES + fate
         for k in range(3):
             dr.scatter_add(self.power, mi.Float64(what[k]), row * 3 + k, where)
 
     def record_end(self, line: mi.UInt32, end: _End) -> None:
-        """Add the remaining power of photons at their ends.
-
-        Args:
-            line: the number of batch and group.
-            end: the end of each photon.
-        """
+        """Add the remaining power of photons at their ends, by their lines."""
         self.record(line, end.last, mi.UInt32(int(Fate.ESCAPED)), end.escaped, mi.Bool(True))
         through = (line * self.surfaces + end.last) * len(SIDES) + _side_of(end.outward)
         leaves = end.last < self.surfaces

@@ -57,10 +57,9 @@ class TracedPhotons:
 
 @dataclass
 class _Course:
-    """A buffer for the paths of photons.
+    """A buffer for `POINTS` points (mm) of each photon's path.
 
     Attributes:
-        points: coordinates (mm) of `POINTS` points for each photon.
         surfaces: number of surfaces, without the additional rows of the lights.
     """
 
@@ -86,11 +85,7 @@ def _follow(
     seen: TargetCells,
     seed: mi.UInt32,
 ) -> tuple[mi.UInt32, mi.UInt32, mi.UInt32]:
-    """Follow photons to their ends.
-
-    Returns:
-        The number of points of each path, and the surface and the fate of its end.
-    """
+    """Follow photons; return numbers of points, and the surfaces and fates of the ends."""
     rng = mi.PCG32()
     first, second = mi.sample_tea_32(photon, seed)
     rng.seed(mi.UInt64(first), mi.UInt64(second))

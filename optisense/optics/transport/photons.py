@@ -113,9 +113,7 @@ class Flight:
 
 @dataclass
 class _Recording:
-    """Records of photons: landings, whether they reach a target, and the crossings of a
-    flux layer.
-    """
+    """Records of landings, of those that reach a target, and of crossings of a flux layer."""
 
     landings: Records
     target: TargetCells | None

@@ -139,9 +139,7 @@ class DifferentiableRays:
     def _follow(
         self, stop: PathVertex, origin: mi.Point3f, direction: mi.Vector3f
     ) -> tuple[mi.Point3f, mi.Vector3f, mi.Point3f, mi.Vector3f, mi.Vector3f]:
-        """Return the point where rays meet a surface, its shading normal, the origin and direction
-        of the rays that continue (unchanged where none does), and the direction of arrival.
-        """
+        """Return hit points, shading normals, continuing rays and directions of arrival."""
         point, normal, shading = _hit(
             self._vertices,
             self._faces,
@@ -166,9 +164,7 @@ class DifferentiableRays:
         )
 
     def _boundary_slopes(self) -> tuple[FloatArray, FloatArray]:
-        """Return the derivatives (k,) along x and along y of the film, per pixel, of the function
-        that is 0 on each boundary.
-        """
+        """Return the derivatives (k,) of `_boundary` along x and along y of the film, per pixel."""
         if self.edges is None:
             return np.zeros(0), np.zeros(0)
         self._normals = self._vertex_normals()
@@ -179,9 +175,7 @@ class DifferentiableRays:
         return by_x, by_y
 
     def _boundary(self, x: mi.Float, y: mi.Float, pose: Pose) -> mi.Float:
-        """Return the value of a function of film positions and all moving things that is 0 on the
-        boundaries.
-        """
+        """Return a function of film positions and moving things that is 0 on boundaries."""
         edges = self.edges
         assert edges is not None
         depth, cause, first, second = (
@@ -252,9 +246,7 @@ class DifferentiableRays:
         return weight
 
     def _vertex_normals(self) -> mi.Float:
-        """Return the normals of all vertices; those of moving sheets are functions of their
-        vertices.
-        """
+        """Return all vertices' normals; those of moving sheets depend on their vertices."""
         fixed = np.zeros((self._starts[-1], 3), dtype=np.float32)
         for piece, start in zip(self._pieces, self._starts[:-1], strict=True):
             if piece.normals is not None and piece.name not in self._sheets:
@@ -310,9 +302,7 @@ class DifferentiableRays:
 
 @dataclass(frozen=True)
 class _Sheet:
-    """A moving, smooth mesh, and the index of its vertex that each vertex of the piece comes
-    from.
-    """
+    """A moving, smooth mesh, and the index of its vertex for each vertex of the piece."""
 
     mesh: TriangleMesh
     source: NDArray[np.integer]
@@ -367,19 +357,14 @@ def _hit(
 
 
 def _evaluated(inputs: list[Any]) -> list[Any]:
-    """Return the gradients of inputs, all computed by one kernel.
-
-    Separate kernels would each repeat the whole work, and compiling one takes seconds.
-    """
+    """Return the gradients of inputs by one kernel: separate ones would repeat the work."""
     slopes = [dr.grad(value) for value in inputs]
     dr.eval(slopes)
     return slopes
 
 
 def _smooth_normals(vertices: mi.Float, corners: mi.UInt32, count: int) -> mi.Float:
-    """Return vertex normals (3 count,) weighted by corner angles, as in `shading_normals`; 0 for
-    vertices without a face.
-    """
+    """Return normals (3 count,) weighted by corner angles; 0 for vertices without a face."""
     index = dr.arange(mi.UInt32, dr.width(corners) // 3) * 3
     ids = [dr.gather(mi.UInt32, corners, index + k) for k in range(3)]
     a, b, c = (dr.gather(mi.Point3f, vertices, i) for i in ids)
