@@ -180,12 +180,7 @@ def light_ledger(
     Raises:
         RenderError: there are too few photons.
     """
-    lights = [group for group in model.design.lights.values() for _ in group.lights]
-    if photons < 100 * len(lights):
-        raise RenderError(
-            f"{photons} photons are too few for {len(lights)} lights",
-            hint=f"give at least {100 * len(lights)}",
-        )
+    refuse_few_photons(model, photons)
     pieces = model.scenes.pieces
     seen = cells_in_view(model) if seen is None else seen
     bookings = trace_ledger(
@@ -203,7 +198,13 @@ def light_ledger(
             line = (place.where, place.kind)
             lines[line] = lines.get(line, 0.0) + power
         lines[GIVEN_UP, LightEnd.LOST] += bookings.rest[:, number] @ flux
-        entries += sorted(_entries(name, lines, emitted[name]), key=lambda entry: -entry.power)
+        entries += sorted(
+            (
+                LedgerEntry(name, *line, *found)
+                for line, found in _lines_with_noise(lines, emitted[name])
+            ),
+            key=lambda entry: -entry.power,
+        )
         faces: dict[tuple[str, str], NDArray[np.float64]] = {}
         for surface, piece in enumerate(pieces):
             for side, words in enumerate(SIDES):
@@ -220,11 +221,14 @@ def light_ledger(
     return LightLedger(emitted, entries, photons, exits)
 
 
-def _entries(
-    group: str, lines: dict[tuple[str, LightEnd], NDArray[np.float64]], emitted: float
-) -> Iterator[LedgerEntry]:
-    for (where, kind), found in _lines_with_noise(lines, emitted):
-        yield LedgerEntry(group, where, kind, *found)
+def refuse_few_photons(model: OpticalModel, photons: int) -> None:
+    """Raise RenderError if there are fewer than 100 photons for each light."""
+    lights = sum(len(group.lights) for group in model.design.lights.values())
+    if photons < 100 * lights:
+        raise RenderError(
+            f"{photons} photons are too few for {lights} lights",
+            hint=f"Give at least {100 * lights}",
+        )
 
 
 def _lines_with_noise(

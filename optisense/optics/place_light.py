@@ -11,16 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.errors import RenderError
 from optisense.geometry.mesh_points import surface_samples
-from optisense.optics.ledger import cells_in_view
+from optisense.optics.ledger import cells_in_view, refuse_few_photons
 from optisense.optics.transport.light_ledger import BATCHES
 from optisense.optics.transport.photons import TargetCells
-from optisense.optics.transport.place_light import (
-    Disc,
-    LightWay,
-    trace_to_place,
-)
+from optisense.optics.transport.place_light import Disc, LightWay, trace_to_place
 from optisense.quality import PICTURE_PHOTONS
 
 if TYPE_CHECKING:
@@ -131,12 +126,7 @@ def light_at(
         ContactError: the place is off the surface.
         RenderError: there are too few photons.
     """
-    lights = sum(len(group.lights) for group in model.design.lights.values())
-    if photons < 100 * lights:
-        raise RenderError(
-            f"{photons} photons are too few for {lights} lights",
-            hint=f"Give at least {100 * lights}",
-        )
+    refuse_few_photons(model, photons)
     place = model.surface.point_at(*at) if len(at) == 2 else model.surface.nearest(at)
     right, _ = model.surface.tangents(place.inward)
     up = np.cross(place.inward, right)
@@ -187,9 +177,7 @@ def _group_light(
 
 def _area_within(triangles: NDArray[np.floating], disc: Disc) -> float:
     """Return the area (mm^2) of triangles (n, 3, 3) within a ball around the centre of a disc."""
-    low, high = triangles.min(axis=1), triangles.max(axis=1)
-    near = ((low < disc.middle + disc.radius) & (high > disc.middle - disc.radius)).all(axis=1)
-    chosen = np.asarray(triangles[near], dtype=np.float64)
+    chosen = np.asarray(_near(triangles, disc), dtype=np.float64)
     # Large triangles near the disc are divided until they are smaller than it.
     while len(chosen) and (sides := _longest(chosen)).max() > disc.radius:
         chosen = np.concatenate([chosen[sides <= disc.radius], _quarters(chosen, sides, disc)])
@@ -205,12 +193,16 @@ def _longest(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _quarters(
     triangles: NDArray[np.float64], sides: NDArray[np.float64], disc: Disc
-) -> NDArray[np.float64]:
+) -> NDArray[np.floating]:
     """Divide triangles larger than the disc's radius into quarters, and drop those far away."""
     a, b, c = np.moveaxis(triangles[sides > disc.radius], 1, 0)
     ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
     pieces = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
-    quarters = np.concatenate([np.stack(piece, axis=1) for piece in pieces])
-    low, high = quarters.min(axis=1), quarters.max(axis=1)
-    near = ((low < disc.middle + disc.radius) & (high > disc.middle - disc.radius)).all(axis=1)
-    return quarters[near]
+    return _near(np.concatenate([np.stack(piece, axis=1) for piece in pieces]), disc)
+
+
+def _near(triangles: NDArray[np.floating], disc: Disc) -> NDArray[np.floating]:
+    """Return those of triangles (n, 3, 3) whose boxes meet the box around a disc."""
+    low, high = triangles.min(axis=1), triangles.max(axis=1)
+    meet = (low < disc.middle + disc.radius) & (high > disc.middle - disc.radius)
+    return triangles[meet.all(axis=1)]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from optisense.geometry import Contact
 from optisense.optics.scene.ray_scene import Ray
-from optisense.optics.transport.chief_rays import RayOutcome
+from optisense.optics.transport.chief_rays import trace_chief_rays
 from optisense.optics.transport.interact import RayKind, interact
 
 if TYPE_CHECKING:
@@ -63,8 +63,6 @@ def trace_paths(
     count = camera.width * camera.height
     points = [np.broadcast_to(_rows(origin), (count, 3))]
     lengths = np.ones(count, dtype=np.int32)
-    outcomes = np.full(count, int(RayOutcome.DEPTH_LIMIT), dtype=np.uint8)
-    total = np.zeros(count, dtype=bool)
     ray = Ray(origin, direction, dr.full(mi.Bool, True, count))
     while (going := np.asarray(ray.active).astype(bool)).any():
         step = interact(scene, ray, RayKind.CHIEF)
@@ -72,17 +70,10 @@ def trace_paths(
         dr.eval(step, end)
         points.append(_rows(end))
         lengths[going] += 1
-        for outcome, there in (
-            (RayOutcome.ESCAPED, ~step.hit.valid),
-            (RayOutcome.ABSORBED, step.ended),
-            (RayOutcome.HIT, step.sensed),
-        ):
-            outcomes[going & np.asarray(there).astype(bool)] = int(outcome)
-        total |= np.asarray(step.totally).astype(bool)
         ray = step.ray
-    outcomes[total & (outcomes != int(RayOutcome.HIT))] = int(RayOutcome.TOTAL_REFLECTION)
     every = np.stack(points, axis=1)
     chosen = np.arange(every.shape[1])[None, :] < lengths[:, None]
+    outcomes = trace_chief_rays(scene, camera).outcome.ravel()
     return RayPaths(every[chosen].astype(np.float32), lengths, outcomes)
 
 

@@ -73,6 +73,11 @@ class LobeSample:
     pick: mi.Float = field(default_factory=lambda: mi.Float(0))
     place: mi.Point2f = field(default_factory=lambda: mi.Point2f(0))
 
+    @classmethod
+    def drawn(cls, rng: mi.PCG32) -> LobeSample:
+        """Draw the numbers."""
+        return cls(rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32()))
+
 
 @dataclass
 class Lobe:

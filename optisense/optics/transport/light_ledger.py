@@ -15,16 +15,14 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.optics.backend.arrays import indices
 from optisense.optics.backend.interrupts import reraise_interrupts
 from optisense.optics.backend.sequences import seed_of
 from optisense.optics.scene.emitters import EmitterTable
 from optisense.optics.scene.ray_scene import Ray, RayScene
-from optisense.optics.scene.surface_cells import cell_at
 from optisense.optics.transport.emission_guide import uniform_guide
 from optisense.optics.transport.interact import Interaction, LobeSample, RayKind, interact
 from optisense.optics.transport.photon_map import GROUP_MASK
-from optisense.optics.transport.photons import Emission, TargetCells, launch
+from optisense.optics.transport.photons import Emission, TargetCells, hashed_generator, launch
 
 PASS_PHOTONS = 1_000_000
 """Number of photons of one pass; progress is reported and Ctrl-C obeyed between passes, which take
@@ -93,32 +91,6 @@ class _Sums:
         for k in range(3):
             dr.scatter_add(self.power, mi.Float64(what[k]), row * 3 + k, where)
 
-    def record_end(self, line: mi.UInt32, end: _End) -> None:
-        """Add the remaining power of photons at their ends, by their lines."""
-        self.record(line, end.last, mi.UInt32(int(Fate.ESCAPED)), end.escaped, mi.Bool(True))
-        through = (line * self.surfaces + end.last) * len(SIDES) + _side_of(end.outward)
-        leaves = end.last < self.surfaces
-        for k in range(3):
-            dr.scatter_add(self.exits, mi.Float64(end.escaped[k]), through * 3 + k, leaves)
-            dr.scatter_add(self.rest, mi.Float64(end.given_up[k]), line * 3 + k)
-
-
-@dataclass
-class _End:
-    """Photons at their ends.
-
-    Attributes:
-        escaped: power (mW) per channel of photons that left the sensor, else 0.
-        given_up: power (mW) per channel of photons whose paths were cut off, else 0.
-        last: the last surface on the path of each photon.
-        outward: the face normal of that surface, on the side on which the photon continued.
-    """
-
-    escaped: mi.Color3f
-    given_up: mi.Color3f
-    last: mi.UInt32
-    outward: mi.Vector3f
-
 
 def _side_of(normal: mi.Vector3f) -> mi.UInt32:
     """Return the index in `SIDES` of the direction nearest to each unit normal."""
@@ -169,13 +141,11 @@ def _follow(
     sums: _Sums,
     seen: TargetCells,
     seed: mi.UInt32,
-) -> _End:
-    """Follow photons to their ends and record their losses."""
-    # The number is hashed, as streams of neighbouring numbers resemble one another, and so would
-    # the batches.
-    rng = mi.PCG32()
-    first, second = mi.sample_tea_32(number, seed)
-    rng.seed(mi.UInt64(first), mi.UInt64(second))
+) -> None:
+    """Follow photons to their ends, and record their losses and what remains."""
+    rng = hashed_generator(number, seed)
+    # The last surface of each photon and its normal on the side on which the photon continued, and
+    # the power (mW) of those that left the sensor.
     last = mi.UInt32(sums.surfaces)
     outward = mi.Vector3f(0, 0, 1)
     gone = mi.Color3f(0)
@@ -184,7 +154,7 @@ def _follow(
     side = mi.UInt32(int(Fate.BEFORE))
     least = LEAST_SHARE * dr.max(power)
     while ray.active:
-        sample = LobeSample(rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32()))
+        sample = LobeSample.drawn(rng)
         step = interact(scene, ray, RayKind.PHOTON, sample)
         hit = step.hit
         if dr.hint(scene.absorbing, mode="scalar"):
@@ -196,8 +166,7 @@ def _follow(
         gone = dr.select(escaped, power, gone)
         kept = dr.select(step.goes_on, power * step.lobe.weight, 0)
         kept = dr.select(step.opaque & (dr.max(kept) < least), 0, kept)
-        cell, near = cell_at(seen.cells, hit.point, step.sensed)
-        near &= dr.gather(mi.UInt32, seen.flags, cell, near) != 0
+        near = seen.contain(hit.point, step.sensed)
         fate = dr.select(near, mi.UInt32(int(Fate.SEEN)), int(Fate.ABSORBED))
         sums.record(line, hit.surface, fate, power - kept, hit.valid)
         power = dr.select(escaped, 0, kept)
@@ -206,7 +175,11 @@ def _follow(
         outward = dr.select(step.goes_on, hit.normal * ahead, outward)
         ray = step.ray
         ray.active &= dr.max(power) > 0
-    return _End(gone, power, last, outward)
+    sums.record(line, last, mi.UInt32(int(Fate.ESCAPED)), gone, mi.Bool(True))
+    through = (line * sums.surfaces + last) * len(SIDES) + _side_of(outward)
+    for k in range(3):
+        dr.scatter_add(sums.exits, mi.Float64(gone[k]), through * 3 + k, last < sums.surfaces)
+        dr.scatter_add(sums.rest, mi.Float64(power[k]), line * 3 + k)
 
 
 @reraise_interrupts
@@ -240,7 +213,7 @@ def trace_ledger(
     for first in range(0, per_light, at_once):
         count = min(at_once, per_light - first)
         emission = Emission(table, guide, count, seed_of(seed, 5), first=first)
-        flight, _ = launch(scene, emission, indices(np.arange(table.count)))
+        flight, _ = launch(scene, emission)
         group = flight.group & GROUP_MASK
         place = flight.number // table.count + first
         # Runs of photons share a batch: their bookings are then summed before they are added.
@@ -248,10 +221,7 @@ def trace_ledger(
         line = batch * table.groups + group
         power = flight.throughput * (count * BATCHES / per_light)
         stream = dr.opaque(mi.UInt32, seed_of(seed, 6, first))
-        end = _follow(
-            scene, flight.ray, power, line, flight.number, flight.medium, sums, seen, stream
-        )
-        sums.record_end(line, end)
+        _follow(scene, flight.ray, power, line, flight.number, flight.medium, sums, seen, stream)
         dr.eval(sums.power, sums.rest, sums.exits)
 
     def by_surface(values: mi.Float64, rows: int) -> NDArray[np.float64]:

@@ -14,17 +14,16 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.optics.backend.arrays import floats, indices
+from optisense.optics.backend.arrays import floats
 from optisense.optics.backend.interrupts import reraise_interrupts
 from optisense.optics.backend.sequences import seed_of
 from optisense.optics.scene.emitters import EmitterTable
 from optisense.optics.scene.ray_scene import Ray, RayScene
-from optisense.optics.scene.surface_cells import cell_at
 from optisense.optics.transport.emission_guide import uniform_guide
 from optisense.optics.transport.interact import MAX_DEPTH, LobeSample, RayKind, interact
 from optisense.optics.transport.light_ledger import Fate, medium_after, medium_before
 from optisense.optics.transport.photon_map import GROUP_MASK
-from optisense.optics.transport.photons import Emission, TargetCells, launch
+from optisense.optics.transport.photons import Emission, TargetCells, hashed_generator, launch
 
 ESCAPE_LENGTH = 4.0
 """Length (mm) of the last segment of a photon that escapes, in a drawing: enough to show its
@@ -86,9 +85,7 @@ def _follow(
     seed: mi.UInt32,
 ) -> tuple[mi.UInt32, mi.UInt32, mi.UInt32]:
     """Follow photons; return numbers of points, and the surfaces and fates of the ends."""
-    rng = mi.PCG32()
-    first, second = mi.sample_tea_32(photon, seed)
-    rng.seed(mi.UInt64(first), mi.UInt64(second))
+    rng = hashed_generator(photon, seed)
     course.write(photon, mi.UInt32(0), ray.origin, mi.Bool(ray.active))
     count = mi.UInt32(1)
     # Photons whose paths are cut off keep these values.
@@ -98,7 +95,7 @@ def _follow(
     bound = course.surfaces + medium
     side = mi.UInt32(int(Fate.BEFORE))
     while ray.active:
-        sample = LobeSample(rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32()))
+        sample = LobeSample.drawn(rng)
         step = interact(scene, ray, RayKind.PHOTON, sample)
         hit = step.hit
         end = dr.select(hit.valid, hit.point, ray.origin + ESCAPE_LENGTH * ray.direction)
@@ -119,8 +116,7 @@ def _follow(
         kept = dr.select(step.goes_on, power * step.lobe.weight, 0)
         goes = _part(kept, power, weights)
         absorbed = hit.valid & ~stopped & (rng.next_float32() >= goes)
-        cell, near = cell_at(seen.cells, hit.point, step.sensed)
-        near &= dr.gather(mi.UInt32, seen.flags, cell, near) != 0
+        near = seen.contain(hit.point, step.sensed)
         by_surface = dr.select(near, mi.UInt32(int(Fate.SEEN)), int(Fate.ABSORBED))
         ending = dr.select(absorbed, hit.surface, ending)
         fate = dr.select(absorbed, by_surface, fate)
@@ -158,7 +154,7 @@ def trace_photon_paths(
         per_light: number of photons of each light.
     """
     emission = Emission(table, uniform_guide(table.count), per_light, seed_of(seed, 7))
-    flight, _ = launch(scene, emission, indices(np.arange(table.count)))
+    flight, _ = launch(scene, emission)
     count = per_light * table.count
     group = flight.group & GROUP_MASK
     weights = dr.gather(mi.Color3f, floats(flux), group)

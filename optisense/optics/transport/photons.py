@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from functools import cached_property
 
 import drjit as dr
 import mitsuba as mi
@@ -67,8 +68,9 @@ class Emission:
     first: int = 0
     groups: Collection[int] | None = None
 
+    @cached_property
     def lights(self) -> mi.UInt32:
-        """Return the numbers (k,) of the lights that are lit."""
+        """The numbers (k,) of the lights that are lit."""
         lit = [
             number
             for number, emitter in enumerate(self.table.emitters)
@@ -90,6 +92,11 @@ class TargetCells:
 
     cells: SurfaceCells
     flags: mi.UInt32
+
+    def contain(self, points: mi.Point3f, active: mi.Bool) -> mi.Bool:
+        """Return a mask (n,) of the active points that lie in flagged cells."""
+        cell, found = cell_at(self.cells, points, active)
+        return found & (dr.gather(mi.UInt32, self.flags, cell, found) != 0)
 
 
 @dataclass
@@ -121,20 +128,17 @@ class _Recording:
     crossings: Records
 
 
-def launch(scene: RayScene, emission: Emission, lights: mi.UInt32) -> tuple[Flight, mi.UInt32]:
-    """Emit photons from lights.
+def launch(scene: RayScene, emission: Emission) -> tuple[Flight, mi.UInt32]:
+    """Emit photons from the lights that are lit.
 
     If refractive indices differ between channels, each photon carries light of one channel; the
     channels take turns.
-
-    Args:
-        lights: numbers (k,) of the lights.
 
     Returns:
         The n photons, and the number (n,) of the guide's cell, over all lights, that each was drawn
         from.
     """
-    table = emission.table
+    table, lights = emission.table, emission.lights
     first, per_light, seed = (
         dr.opaque(mi.UInt32, value) for value in (emission.first, emission.per_light, emission.seed)
     )
@@ -176,7 +180,7 @@ def _fly(scene: RayScene, flight: Flight, recording: _Recording, seed: mi.UInt64
     # change of the design therefore changes few paths.
     rng = mi.PCG32(initstate=seed, initseq=mi.UInt64(flight.number))
     while dr.hint(ray.active, exclude=[scene, flight, seed]):
-        sample = LobeSample(rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32()))
+        sample = LobeSample.drawn(rng)
         step = interact(scene, ray, RayKind.PHOTON, sample)
         hit = step.hit
         if dr.hint(recording.flux_layer is not None, mode="scalar"):
@@ -216,8 +220,7 @@ def _fly(scene: RayScene, flight: Flight, recording: _Recording, seed: mi.UInt64
         if dr.hint(recording.target is not None, mode="scalar"):
             target = recording.target
             assert target is not None
-            cell, found = cell_at(target.cells, hit.point, step.opaque)
-            landed |= found & (dr.gather(mi.UInt32, target.flags, cell, found) != 0)
+            landed |= target.contain(hit.point, step.opaque)
         throughput *= step.lobe.weight
         ray = step.ray
         far = ray.depth >= MAX_DEPTH
@@ -226,6 +229,17 @@ def _fly(scene: RayScene, flight: Flight, recording: _Recording, seed: mi.UInt64
             ray.active &= rng.next_float32() < survival
             throughput /= dr.maximum(survival, 1e-6)
     return landed
+
+
+def hashed_generator(number: mi.UInt32, seed: mi.UInt32) -> mi.PCG32:
+    """Return a random generator for each photon, by its number.
+
+    The number is hashed, as streams of neighbouring numbers resemble one another.
+    """
+    rng = mi.PCG32()
+    first, second = mi.sample_tea_32(number, seed)
+    rng.seed(mi.UInt64(first), mi.UInt64(second))
+    return rng
 
 
 def survival_probability(step: Interaction) -> mi.Float:
@@ -270,15 +284,14 @@ def _traced(
     coloured: bool,
 ) -> tuple[mi.UInt32, PhotonMap]:
     """Trace a pass and collect its landings; a pass whose landings do not fit is repeated."""
-    lights = emission.lights()
-    photons = emission.per_light * dr.width(lights)
+    photons = emission.per_light * dr.width(emission.lights)
     room = [int(photons * LANDINGS_PER_PHOTON) + 1024, 0]
     if flux_layer is not None:
         room[1] = photons * SAMPLES_PER_SEGMENT + 1024
     while True:
         landings, crossings = (Records.of(each, coloured) for each in room)
         recording = _Recording(landings, target, flux_layer, crossings)
-        flight, cell = launch(scene, emission, lights)
+        flight, cell = launch(scene, emission)
         seed = dr.opaque(mi.UInt64, seed_of(emission.seed, emission.first))
         landed = _fly(scene, flight, recording, seed)
         cells = dr.select(landed, cell, mi.UInt32(0xFFFFFFFF))

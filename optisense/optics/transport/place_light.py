@@ -14,12 +14,10 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.optics.backend.arrays import indices
 from optisense.optics.backend.interrupts import reraise_interrupts
 from optisense.optics.backend.sequences import seed_of
 from optisense.optics.scene.emitters import EmitterTable
 from optisense.optics.scene.ray_scene import RayScene
-from optisense.optics.scene.surface_cells import cell_at
 from optisense.optics.transport.emission_guide import uniform_guide
 from optisense.optics.transport.interact import MAX_DEPTH, LobeSample, RayKind, interact
 from optisense.optics.transport.light_ledger import BATCHES
@@ -28,6 +26,7 @@ from optisense.optics.transport.photons import (
     Emission,
     Flight,
     TargetCells,
+    hashed_generator,
     launch,
     survival_probability,
 )
@@ -103,18 +102,15 @@ def _count(
     """Follow photons to their ends and add their power to the lines of a tally."""
     middle, seen = tally.middle, tally.seen
     ray, power = flight.ray, flight.throughput
-    rng = mi.PCG32()
-    first, second = mi.sample_tea_32(flight.number, seed)
-    rng.seed(mi.UInt64(first), mi.UInt64(second))
+    rng = hashed_generator(flight.number, seed)
     way = mi.UInt32(0)
     while ray.active:
-        sample = LobeSample(rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32()))
+        sample = LobeSample.drawn(rng)
         step = interact(scene, ray, RayKind.PHOTON, sample)
         power *= step.transmittance
         offset = mi.Vector3f(step.hit.point) - middle
         lands = step.sensed & (dr.squared_norm(offset) < tally.radius * tally.radius)
-        cell, near = cell_at(seen.cells, step.hit.point, step.sensed)
-        near &= dr.gather(mi.UInt32, seen.flags, cell, near) != 0
+        near = seen.contain(step.hit.point, step.sensed)
         for k in range(3):
             dr.scatter_add(tally.view, mi.Float64(power[k]), line * 3 + k, near)
         if lands:
@@ -185,11 +181,10 @@ def trace_to_place(
         view=dr.zeros(mi.Float64, BATCHES * groups * 3),
     )
     per_light = max(1, photons // (BATCHES * table.count))
-    lights = indices(np.arange(table.count))
     guide = uniform_guide(table.count)
     for batch in range(BATCHES):
         emission = Emission(table, guide, per_light, seed_of(seed, 6, batch))
-        flight, _ = launch(scene, emission, lights)
+        flight, _ = launch(scene, emission)
         line = (flight.group & GROUP_MASK) + dr.opaque(mi.UInt32, batch * groups)
         _count(scene, tally, flight, line, dr.opaque(mi.UInt32, seed_of(seed, 7, batch)))
         dr.eval(tally.sums, tally.moments, tally.view)
