@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from benchmarks.mitsuba_export import PATH_DEPTH, Colour, mitsuba_scene
 from optisense.design.emitters import Intensity
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging.cached import render_cached
+from optisense.optics.imaging.sampling import SamplingPlan
 from optisense.optics.imaging.sppm import render_sppm
 from optisense.optics.radiance_cache.lit_scene import LitScene
 from optisense.optics.radiance_cache.store import CacheStore
@@ -31,7 +33,8 @@ from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind, is_coloured
 from optisense.optics.transport.chief_rays import ChiefRays, trace_chief_rays
 from optisense.optics.transport.emission_guide import uniform_guide
-from optisense.optics.transport.photons import Emission
+from optisense.optics.transport.photon_map import SURFACE_SHIFT, PhotonMap
+from optisense.optics.transport.photons import Emission, trace_photons
 
 FloatArray = NDArray[np.floating]
 
@@ -107,9 +110,8 @@ class ReferenceScene:
         )
         fixed = RayScene([self.pieces[i] for i in opaque], opaque, scene.table)
         scenes = ContactScenes(scene, fixed, None, mi.Float())
-        layers = render_cached(
-            light, scenes, self.camera, rays, LampWindows.of(self.emitters), seed
-        )
+        windows, plan = LampWindows.of(self.emitters), SamplingPlan()
+        layers = render_cached(light, scenes, self.camera, rays, windows, seed, plan, None, None)
         return self._scaled(layers.radiance)
 
     def path(self, samples: int, seed: int = 0, max_depth: int = PATH_DEPTH) -> FloatArray:
@@ -128,6 +130,47 @@ class ReferenceScene:
 def isotropic() -> Intensity:
     """The same intensity all around."""
     return Intensity(np.array([0.0, 180.0]), np.zeros(1), np.ones((1, 2)))
+
+
+def narrow_beam(half_angle: float = 0.02) -> Intensity:
+    """The same intensity within an angle (degrees) from the axis, and none beyond."""
+    return Intensity(np.array([0.0, half_angle]), np.zeros(1), np.ones((1, 2)))
+
+
+def fresnel(angle: float, ratio: float) -> tuple[float, float]:
+    """Unpolarised reflectance, and the refracted angle; ratio is far over near index."""
+    inside = np.arcsin(np.sin(angle) / ratio)
+    s = (np.sin(angle - inside) / np.sin(angle + inside)) ** 2
+    p = (np.tan(angle - inside) / np.tan(angle + inside)) ** 2
+    return float((s + p) / 2), float(inside)
+
+
+class Landings:
+    """Photons as arrays: place (n, 3), direction (n, 3), power (n,) or (n, 3), surface (n,)."""
+
+    def __init__(self, found: PhotonMap) -> None:
+        place, travel = (np.asarray(x)[: 4 * found.count] for x in (found.place, found.travel))
+        self.place = place.reshape(-1, 4)[:, :3].astype(float)
+        self.surface = place[3::4].copy().view(np.uint32) >> SURFACE_SHIFT
+        self.direction = travel.reshape(-1, 4)[:, :3].astype(float)
+        power = np.asarray(found.power)[: (4 if found.coloured else 1) * found.count].astype(float)
+        self.power = power.reshape(-1, 4)[:, :3] if found.coloured else power
+
+
+def landings_of(
+    pieces: list[Piece], emitters: list[Emitter], photons: int, coloured: bool = False
+) -> Landings:
+    """The landings of one pass from lights of one group."""
+    count = len(emitters)
+    emission = Emission(emitter_table(emitters, 1), uniform_guide(count), photons // count, 1)
+    return Landings(trace_photons(RayScene(pieces), emission, coloured=coloured))
+
+
+def pixel_middles(camera: RayCamera) -> tuple[mi.UInt32, mi.Point2f]:
+    """The number and the middle of every pixel."""
+    pixel = dr.arange(mi.UInt32, camera.width * camera.height)
+    width = camera.width
+    return pixel, mi.Point2f(mi.Float(pixel % width) + 0.5, mi.Float(pixel // width) + 0.5)
 
 
 def diffuse_coating(reflectance: float) -> Surface:
@@ -154,6 +197,12 @@ def metal_coating(alpha: float, eta: Colour, k: Colour, specularity: float = 1.0
 def quad(name: str, corners: Sequence[Sequence[float]], surface: Surface) -> Piece:
     """A plane quadrilateral; its normal follows the right hand along the corners."""
     return Piece(name, np.asarray(corners, float), np.array([[0, 1, 2], [0, 2, 3]]), surface)
+
+
+def floor(surface: Surface, half: float = 10.0, z: float = 0.0) -> Piece:
+    """A level square about the z axis that faces up."""
+    corners = [(-half, -half, z), (half, -half, z), (half, half, z), (-half, half, z)]
+    return quad("floor", corners, surface)
 
 
 def box(
@@ -250,6 +299,20 @@ def referee_scene(
         flux.append((float(colour[0] * power), float(colour[1] * power), float(colour[2] * power)))
     camera = RayCamera((0.0, 0.0, 24.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0), 42.0, *resolution)
     return ReferenceScene(pieces, emitters, flux, camera)
+
+
+def side_lit_block(glass: Surface, side: Surface | None = None) -> ReferenceScene:
+    """A coated block, lit by a lamp in air through its side, which may have a surface of its own,
+    seen from above.
+    """
+    lamp = Emitter(0, (-7.0, 0, 2), (1, 0, 0), (0, 0, 1), EmitterShape.RECTANGLE, (6.0, 3.0))
+    low, high = (-6, -5, 0), (6, 5, 4)
+    pieces = [box("block", low, high, glass, without=["-z"] if side is None else ["-z", "-x"])]
+    if side is not None:
+        pieces.append(box("side", low, high, side, without=["-z", "+z", "+x", "-y", "+y"]))
+    pieces += [emitting_face(0, lamp), floor(diffuse_coating(0.6), 6.0)]
+    camera = RayCamera((0, 0, 24), (0, 0, -1), (0, 1, 0), 22, 32, 24)
+    return ReferenceScene(pieces, [lamp], [(100.0,) * 3], camera)
 
 
 def emitting_face(number: int, emitter: Emitter) -> Piece:

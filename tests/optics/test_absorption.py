@@ -8,10 +8,21 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
-from reference_scenes import ReferenceScene, box, diffuse_coating, emitting_face, isotropic, quad
+from reference_scenes import (
+    ReferenceScene,
+    box,
+    diffuse_coating,
+    floor,
+    fresnel,
+    isotropic,
+    landings_of,
+    narrow_beam,
+    pixel_middles,
+    quad,
+    side_lit_block,
+)
 
 from optisense import OpticalModel, load
-from optisense.design.emitters import Intensity
 from optisense.design.materials import Dielectric
 from optisense.design.parts import Role
 from optisense.geometry import TriangleMesh, parse_contact
@@ -26,15 +37,16 @@ from optisense.optics.scene.emitters import (
     emit,
     emitter_table,
 )
-from optisense.optics.scene.ray_scene import Piece, RayScene
+from optisense.optics.scene.ray_scene import RayScene
 from optisense.optics.scene.surfaces import CLEAR, RGB, Surface, SurfaceKind
 from optisense.optics.transport.camera_paths import find_visible_points
-from optisense.optics.transport.emission_guide import uniform_guide
-from optisense.optics.transport.photons import Emission, trace_photons
 
 INDEX = 1.5
 ABSORPTION: RGB = (0.05, 0.2, 0.4)
 """Absorption coefficients per mm at R, G, B."""
+
+BLACK = diffuse_coating(0.0)
+PHOTONS = 100_000
 
 SINGLE = 1e-4
 """Relative error of one beam in single precision."""
@@ -47,60 +59,41 @@ def glass(inside: RGB = ABSORPTION, outside: RGB = CLEAR) -> Surface:
     return Surface(SurfaceKind.DIELECTRIC, eta=INDEX, absorption=(inside, outside))
 
 
-def floor(reflectance: float, z: float, half: float = 60.0) -> Piece:
-    corners = [(-half, -half, z), (half, -half, z), (half, half, z), (-half, half, z)]
-    return quad("floor", corners, diffuse_coating(reflectance))
-
-
-def landed(pieces: list[Piece], lamp: Emitter, photons: int = 100_000) -> np.ndarray:
-    """(n, 3) mm and (n, 3) powers of the photons that landed."""
-    camera = RayCamera(*[(0, 0, 1)] * 3, 1, 1, 1)
-    table = ReferenceScene(pieces, [lamp], [(1, 1, 1)], camera).table()
-    emission = Emission(table, uniform_guide(1), photons, 1)
-    found = trace_photons(RayScene(pieces), emission, coloured=True)
-    place = np.asarray(found.place)[: 4 * found.count].reshape(-1, 4)[:, :3]
-    power = np.asarray(found.power)[: 4 * found.count].reshape(-1, 4)[:, :3]
-    return np.stack([place, power]).astype(float)
-
-
 def beam(degrees: float) -> Emitter:
     """A beam that meets the origin from 1 mm above, in air."""
     angle = np.radians(degrees)
-    narrow = Intensity(np.array([0.0, 0.02]), np.zeros(1), np.ones((1, 2)))
     way = (float(np.sin(angle)), 0.0, float(-np.cos(angle)))
-    return Emitter(0, (-float(np.tan(angle)), 0.0, 1.0), way, intensity=narrow)
+    return Emitter(0, (-float(np.tan(angle)), 0.0, 1.0), way, intensity=narrow_beam())
 
 
-def fresnel(angle: float) -> tuple[float, float]:
-    """Reflectance of glass in air, and the angle inside."""
-    inside = np.arcsin(np.sin(angle) / INDEX)
-    s = (np.sin(angle - inside) / np.sin(angle + inside)) ** 2
-    p = (np.tan(angle - inside) / np.tan(angle + inside)) ** 2
-    return float((s + p) / 2), float(inside)
-
-
+@pytest.mark.parametrize("absorption", [ABSORPTION, CLEAR], ids=["absorbing", "clear"])
 @pytest.mark.parametrize("degrees", [20.0, 50.0, 75.0])
-def test_a_slab_passes_what_beer_lambert_and_fresnel_leave(degrees: float) -> None:
-    thickness = 2.0
-    slab = box("slab", (-40, -40, -thickness), (40, 40, 0), glass())
-    place, power = landed([slab, floor(0.0, -3.0)], beam(degrees))
-    reflectance, inside = fresnel(np.radians(degrees))
-    left = np.exp(-np.array(ABSORPTION) * thickness / np.cos(inside))
+def test_a_beam_through_a_slab_is_displaced_and_weakened(degrees: float, absorption: RGB) -> None:
+    """The slab leaves what Beer and Lambert's law and Fresnel's equations say."""
+    angle, thickness = np.radians(degrees), 2.0
+    slab = box("slab", (-40, -40, -thickness), (40, 40, 0), glass(absorption))
+    lamp = beam(degrees)
+    found = landings_of([slab, floor(BLACK, 60, -3.0)], [lamp], PHOTONS, True)
+    reflectance, inside = fresnel(angle, INDEX)
+    left = np.exp(-np.array(absorption) * thickness / np.cos(inside))
     every_order = (1 - reflectance) ** 2 * left / (1 - (reflectance * left) ** 2)
-    assert power.sum(axis=0) == pytest.approx(every_order, rel=SUMMED)
-    direct = abs(place[:, 0] - thickness * np.tan(inside) - np.tan(np.radians(degrees))) < 0.1
-    assert power[direct].sum(axis=0) == pytest.approx((1 - reflectance) ** 2 * left, rel=SUMMED)
+    assert found.power.sum(axis=0) == pytest.approx(every_order, rel=SUMMED)
+    exit_x = thickness * np.tan(inside) + np.tan(angle)
+    direct = np.abs(found.place[:, 0] - exit_x) < 0.1
+    once = (1 - reflectance) ** 2 * left
+    assert found.power[direct].sum(axis=0) == pytest.approx(once, rel=SUMMED)
+    assert found.place[direct, 0].mean() == pytest.approx(exit_x, abs=0.005)
+    assert found.direction[direct].mean(axis=0) == pytest.approx(lamp.direction, abs=1e-3)
 
 
 def test_light_is_absorbed_by_the_medium_that_it_starts_in() -> None:
     """A lamp in the gel, over its coating: no interface tells what is between them."""
-    narrow = Intensity(np.array([0.0, 0.02]), np.zeros(1), np.ones((1, 2)))
     gel = box("gel", (-10, -10, 0), (10, 10, 4), glass(), without=["-z"])
     for absorption in (ABSORPTION, CLEAR):
         lamp = Emitter(
-            0, (0, 0, 3), (0, 0, -1), intensity=narrow, media=(StartMedium(0, absorption),)
+            0, (0, 0, 3), (0, 0, -1), intensity=narrow_beam(), media=(StartMedium(0, absorption),)
         )
-        power = landed([gel, floor(0.0, 0.0)], lamp)[1].sum(axis=0)
+        power = landings_of([gel, floor(BLACK)], [lamp], PHOTONS, True).power.sum(axis=0)
         assert power == pytest.approx(np.exp(-3 * np.array(absorption)), rel=SINGLE)
 
 
@@ -161,12 +154,11 @@ def test_light_between_two_media_is_absorbed_by_each() -> None:
             [(-9, -9, 1), (9, -9, 1), (9, 9, 1), (-9, 9, 1)],
             Surface(SurfaceKind.DIELECTRIC, eta=1.0, absorption=(lower, upper)),
         ),
-        floor(0.0, 0.0),
+        floor(BLACK),
     ]
     # Normals look up, so that "inside" is below each.
-    narrow = Intensity(np.array([0.0, 0.02]), np.zeros(1), np.ones((1, 2)))
-    lamp = Emitter(0, (0, 0, 3), (0, 0, -1), intensity=narrow)
-    power = landed(pieces, lamp)[1].sum(axis=0)
+    lamp = Emitter(0, (0, 0, 3), (0, 0, -1), intensity=narrow_beam())
+    power = landings_of(pieces, [lamp], PHOTONS, True).power.sum(axis=0)
     reflectance = ((INDEX - 1) / (INDEX + 1)) ** 2
     expected = (1 - reflectance) * np.exp(-np.array(upper) - np.array(lower))
     assert power == pytest.approx(expected, rel=SUMMED)
@@ -174,28 +166,18 @@ def test_light_between_two_media_is_absorbed_by_each() -> None:
 
 def test_a_camera_sees_through_an_absorbing_block_by_the_length_of_its_rays() -> None:
     camera = RayCamera((0, 0, 10), (0, 0, -1), (0, 1, 0), 60, 32, 24)
-    pixel = dr.arange(mi.UInt32, 32 * 24)
-    film = mi.Point2f(mi.Float(pixel % 32) + 0.5, mi.Float(pixel // 32) + 0.5)
+    pixel, film = pixel_middles(camera)
     block = box("block", (-40, -40, 0), (40, 40, 3), glass(), without=["-z"])
-    scene = RayScene([block, floor(0.5, 0.0, 40.0)])
+    scene = RayScene([block, floor(diffuse_coating(0.5), 40.0)])
     main, _ = find_visible_points(scene, camera, pixel, pixel, film, 0)
     points = np.asarray(main.point).T
     towards = np.asarray(main.towards_eye).T
     length = 3 / towards[:, 2]
     angle = np.arcsin(np.minimum(INDEX * np.sqrt(1 - towards[:, 2] ** 2), 1))
-    reflectance = np.array([fresnel(a)[0] if a > 1e-3 else 0.04 for a in angle])
+    reflectance = np.array([fresnel(a, INDEX)[0] if a > 1e-3 else 0.04 for a in angle])
     expected = (1 - reflectance) / INDEX**2 * np.exp(-np.array(ABSORPTION)[:, None] * length)
     assert np.asarray(main.weight) == pytest.approx(expected, rel=1e-3)
     assert points[:, 2] == pytest.approx(0.0, abs=1e-4)
-
-
-def gel_with_lamp(absorption: RGB) -> ReferenceScene:
-    """A coated block of gel, lit from the side by a lamp in air, seen from above."""
-    lamp = Emitter(0, (-7.0, 0, 2), (1, 0, 0), (0, 0, 1), EmitterShape.RECTANGLE, (6.0, 3.0))
-    gel = box("gel", (-6, -5, 0), (6, 5, 4), glass(absorption), without=["-z"])
-    pieces = [gel, emitting_face(0, lamp), floor(0.6, 0.0, 6.0)]
-    camera = RayCamera((0, 0, 24), (0, 0, -1), (0, 1, 0), 22, 32, 24)
-    return ReferenceScene(pieces, [lamp], [(100.0,) * 3], camera)
 
 
 PATH_MEAN = (0.025257, 0.012802, 0.0026150)
@@ -215,21 +197,24 @@ AGAINST_PATH = 0.015
 
 
 def test_both_estimators_agree_with_mitsuba_in_an_absorbing_gel() -> None:
-    scene = gel_with_lamp((0.02, 0.08, 0.25))
+    scene = side_lit_block(glass((0.02, 0.08, 0.25)))
     for image in (scene.pairwise(4, 800_000)[0], scene.pooled(800_000)):
         mean = image.sum(axis=0).mean(axis=(0, 1))
         assert mean == pytest.approx(PATH_MEAN, rel=AGAINST_PATH)
 
 
 def test_the_exported_scene_still_renders_as_recorded() -> None:
-    got = gel_with_lamp((0.02, 0.08, 0.25)).path(1024).mean(axis=(0, 1))
+    got = side_lit_block(glass((0.02, 0.08, 0.25))).path(1024).mean(axis=(0, 1))
     assert got == pytest.approx(PATH_MEAN, rel=SHORT_PATH)
 
 
 def test_nothing_changes_where_no_medium_absorbs() -> None:
     clear, unknown = (
         ReferenceScene(
-            [box("gel", (-6, -5, 0), (6, 5, 4), surface, without=["-z"]), floor(0.6, 0.0, 6.0)],
+            [
+                box("gel", (-6, -5, 0), (6, 5, 4), surface, without=["-z"]),
+                floor(diffuse_coating(0.6), 6.0),
+            ],
             [Emitter(0, (-7.0, 0, 2), (1, 0, 0), intensity=isotropic())],
             [(100.0,) * 3],
             RayCamera((0, 0, 24), (0, 0, -1), (0, 1, 0), 22, 32, 24),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from reference_scenes import ReferenceScene, diffuse_coating, isotropic, quad
+from reference_scenes import ReferenceScene, diffuse_coating, floor, isotropic
 
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging.sppm import render_sppm
@@ -29,13 +29,10 @@ HEIGHT = 4.0
 
 
 def scene(shape: EmitterShape = EmitterShape.POINT) -> ReferenceScene:
-    corners = [(-9.0, -9, 0), (9.0, -9, 0), (9.0, 9, 0), (-9.0, 9, 0)]
     profile = isotropic() if shape is EmitterShape.POINT else None
     lamp = Emitter(0, (0.5, 0, HEIGHT), (0, 0, -1), (0, 1, 0), shape, (1.0, 1.0), 1.0, profile)
     camera = RayCamera((0, 0, 20), (0, 0, -1), (0, 1, 0), 20.0, 32, 24)
-    return ReferenceScene(
-        [quad("floor", corners, diffuse_coating(0.5))], [lamp], [(1.0, 1.0, 1.0)], camera
-    )
+    return ReferenceScene([floor(diffuse_coating(0.5), 9.0)], [lamp], [(1.0, 1.0, 1.0)], camera)
 
 
 def closed_form(where: ReferenceScene) -> np.ndarray:

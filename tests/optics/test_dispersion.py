@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
-from reference_scenes import ReferenceScene, box, diffuse_coating, emitting_face, quad
+from reference_scenes import (
+    ReferenceScene,
+    diffuse_coating,
+    landings_of,
+    narrow_beam,
+    pixel_middles,
+    quad,
+    side_lit_block,
+)
 
 import optisense as ots
 from benchmarks.mitsuba_export import mitsuba_scene
-from optisense.design.emitters import Intensity
 from optisense.design.materials import Dielectric
 from optisense.optics import OpticalModel
-from optisense.optics.camera.projection import RayCamera
-from optisense.optics.scene.emitters import Emitter, EmitterShape
+from optisense.optics.scene.emitters import Emitter
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import RGB, Surface, SurfaceKind
 from optisense.optics.transport.camera_paths import find_visible_points
-from optisense.optics.transport.emission_guide import uniform_guide
-from optisense.optics.transport.photons import Emission, trace_photons
 
 INDICES: RGB = (1.489, 1.494, 1.499)
 """Indices of acrylic at R, G, B."""
@@ -53,17 +56,11 @@ def test_a_prism_turns_each_channel_by_its_own_angle() -> None:
     tilt = np.radians(4.0)  # the beam's, upwards; the left face's normal is APEX / 2 above -x
     incidence = APEX / 2 + tilt
     way = (float(np.cos(tilt)), 0.0, float(np.sin(tilt)))
-    narrow = Intensity(np.array([0.0, 0.01]), np.zeros(1), np.ones((1, 2)))
-    lamp = Emitter(0, (-8.0, 0.0, -4.0), way, intensity=narrow)
+    lamp = Emitter(0, (-8.0, 0.0, -4.0), way, intensity=narrow_beam(0.01))
     corners = [(30, -40, -60), (30, -40, 60), (30, 40, 60), (30, 40, -60)]
     pieces = [prism(INDICES), quad("wall", corners, diffuse_coating(0.0))]
-    camera = RayCamera(*[(0, 0, 1)] * 3, 1, 1, 1)
-    table = ReferenceScene(pieces, [lamp], [(1, 1, 1)], camera).table()
-    found = trace_photons(
-        RayScene(pieces), Emission(table, uniform_guide(1), 30_000, 1), coloured=True
-    )
-    power = np.asarray(found.power)[: 4 * found.count].reshape(-1, 4)[:, :3]
-    travel = np.asarray(found.travel)[: 4 * found.count].reshape(-1, 4)[:, :3].astype(float)
+    found = landings_of(pieces, [lamp], 30_000, True)
+    power, travel = found.power, found.direction
     assert np.all((power > 0).sum(axis=1) == 1)  # each photon is light of one channel
     angles = np.arctan2(travel[:, 2], travel[:, 0])
     expected = [tilt - deviation(index, incidence) for index in INDICES]
@@ -77,14 +74,7 @@ def test_a_prism_turns_each_channel_by_its_own_angle() -> None:
 
 
 def block(etas: RGB) -> ReferenceScene:
-    """A coated block, lit from the side by a lamp in air, seen from above."""
-    lamp = Emitter(0, (-7.0, 0, 2), (1, 0, 0), (0, 0, 1), EmitterShape.RECTANGLE, (6.0, 3.0))
-    glass = Surface(SurfaceKind.DIELECTRIC, eta=etas[1], etas=etas)
-    gel = box("gel", (-6, -5, 0), (6, 5, 4), glass, without=["-z"])
-    corners = [(-6, -6, 0), (6, -6, 0), (6, 6, 0), (-6, 6, 0)]
-    pieces = [gel, emitting_face(0, lamp), quad("floor", corners, diffuse_coating(0.6))]
-    camera = RayCamera((0, 0, 24), (0, 0, -1), (0, 1, 0), 22, 32, 24)
-    return ReferenceScene(pieces, [lamp], [(100.0,) * 3], camera)
+    return side_lit_block(Surface(SurfaceKind.DIELECTRIC, eta=etas[1], etas=etas))
 
 
 WIDE: RGB = (1.3, 1.45, 1.6)
@@ -115,8 +105,7 @@ def test_both_estimators_agree_with_mitsuba_channel_by_channel() -> None:
 
 def test_a_camera_sees_each_channel_by_its_own_way() -> None:
     scene = block(WIDE)
-    pixel = dr.arange(mi.UInt32, 32 * 24)
-    film = mi.Point2f(mi.Float(pixel % 32) + 0.5, mi.Float(pixel // 32) + 0.5)
+    pixel, film = pixel_middles(scene.camera)
     for channel, index in enumerate(WIDE):
         main, _ = find_visible_points(
             RayScene(scene.pieces), scene.camera, pixel, pixel, film, 0, channel=channel

@@ -9,6 +9,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
+from reference_scenes import isotropic
 from scipy import stats
 
 import optisense as ots
@@ -39,7 +40,6 @@ SIGNIFICANCE = 0.001
 SAMPLES = 200_000
 LAMP = Path(optisense.library.__file__).parent / "lights" / "osram-topled-black-30.ies"
 
-ISOTROPIC = Intensity(np.array([0.0, 180.0]), np.zeros(1), np.ones((1, 2)))
 LOPSIDED = Intensity(
     np.array([0.0, 15.0, 30.0, 50.0, 75.0]),
     np.array([0.0, 60.0, 90.0, 180.0, 270.0, 360.0]),
@@ -144,7 +144,7 @@ def test_flat_lights_radiate_as_a_power_of_the_cosine(shape: EmitterShape, expon
         LOPSIDED,
         SpotEmitter(cutoff=40, beam=20).intensity(),
         SpotEmitter(cutoff=12, beam=12).intensity(),
-        ISOTROPIC,
+        isotropic(),
         RING,
         CONES,
         BACKWARD,

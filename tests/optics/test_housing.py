@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from reference_scenes import Landings
 
 from optisense.design import SensorDesign
 from optisense.geometry import TriangleMesh
@@ -13,7 +14,6 @@ from optisense.geometry.mesh import grid_faces
 from optisense.optics import OpticalModel
 from optisense.optics.scene.surfaces import Region
 from optisense.optics.transport.emission_guide import uniform_guide
-from optisense.optics.transport.photon_map import SURFACE_SHIFT
 from optisense.optics.transport.photons import Emission, trace_photons
 
 RADIUS = 10.0
@@ -76,11 +76,9 @@ def sphere(reflectance: float | None, coating: float = 0.0) -> SensorDesign:
 def landed(model: OpticalModel, photons: int = PHOTONS) -> float:
     """The share of the lamp's light that lands on the sensing surface."""
     emission = Emission(model.scenes.emitter_table, uniform_guide(1), photons, 1)
-    found = trace_photons(model.scene, emission, coloured=False)
-    place = np.asarray(found.place)[: 4 * found.count].reshape(-1, 4)
-    surface = place[:, 3].copy().view(np.uint32) >> SURFACE_SHIFT
+    found = Landings(trace_photons(model.scene, emission, coloured=False))
     skin = [k for k, p in enumerate(model.scenes.pieces) if p.surface.region is Region.SENSING]
-    return float(np.asarray(found.power)[: found.count][np.isin(surface, skin)].sum())
+    return float(found.power[np.isin(found.surface, skin)].sum())
 
 
 SHARE = (1 - np.cos(np.radians(PORT))) / 2

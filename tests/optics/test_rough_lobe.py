@@ -7,12 +7,10 @@ import mitsuba as mi
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from reference_scenes import ReferenceScene, box, diffuse_coating, emitting_face, quad
+from reference_scenes import side_lit_block
 from scipy.stats import chi2
 
 from optisense.design.reflectance import fresnel_dielectric, ggx_density, smith_shadowing
-from optisense.optics.camera.projection import RayCamera
-from optisense.optics.scene.emitters import Emitter, EmitterShape
 from optisense.optics.scene.interfaces import sample_rough_interface
 from optisense.optics.scene.surfaces import Surface, SurfaceKind
 
@@ -108,29 +106,14 @@ def test_a_rough_face_makes_no_light_and_loses_what_meets_several_facets(
         assert 1 - lost <= weight.mean() <= 1 + 1e-5
 
 
-def block_with_a_frosted_side() -> ReferenceScene:
-    """A coated block of acrylic, lit by a lamp in air through its frosted side, seen from above."""
-    lamp = Emitter(0, (-7.0, 0, 2), (1, 0, 0), (0, 0, 1), EmitterShape.RECTANGLE, (6.0, 3.0))
-    clear = Surface(SurfaceKind.DIELECTRIC, eta=INDEX)
-    rough = Surface(SurfaceKind.DIELECTRIC, eta=INDEX, alpha=0.3)
-    low, high = (-6, -5, 0), (6, 5, 4)
-    corners = [(-6, -6, 0), (6, -6, 0), (6, 6, 0), (-6, 6, 0)]
-    pieces = [
-        box("block", low, high, clear, without=["-z", "-x"]),
-        box("side", low, high, rough, without=["-z", "+z", "+x", "-y", "+y"]),
-        emitting_face(0, lamp),
-        quad("floor", corners, diffuse_coating(0.6)),
-    ]
-    camera = RayCamera((0, 0, 24), (0, 0, -1), (0, 1, 0), 22, 32, 24)
-    return ReferenceScene(pieces, [lamp], [(100.0,) * 3], camera)
-
-
 PATH_MEAN = 0.034288
 """Mean of images by Mitsuba 3.9.1's path of this scene: 24 images of 2048 samples a pixel, with a
 standard error of 0.08 %."""
 
 
 def test_both_estimators_agree_with_mitsuba_behind_a_frosted_side() -> None:
-    scene = block_with_a_frosted_side()
+    """The block is of acrylic."""
+    clear = Surface(SurfaceKind.DIELECTRIC, eta=INDEX)
+    scene = side_lit_block(clear, Surface(SurfaceKind.DIELECTRIC, eta=INDEX, alpha=0.3))
     for image in (scene.pairwise(3, 600_000)[0], scene.pooled(800_000)):
         assert image.sum(axis=0).mean() == pytest.approx(PATH_MEAN, rel=0.01)
