@@ -30,6 +30,15 @@ def in_box(point: np.ndarray, lower: Sequence[float], upper: Sequence[float]) ->
     return bool((point > lower).all() and (point < upper).all())
 
 
+def first_of(*boxes: tuple[Sequence[float], Sequence[float], float]) -> Truth:
+    """The index in the first of boxes (lower and upper corner, index) that holds a point."""
+
+    def truth(point: np.ndarray) -> float:
+        return next((ior for lower, upper, ior in boxes if in_box(point, lower, upper)), 1.0)
+
+    return truth
+
+
 def ball(radius: float, centre: Sequence[float] = (0, 0, 0), subdivisions: int = 3) -> TriangleMesh:
     import trimesh
 

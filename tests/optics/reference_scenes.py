@@ -31,7 +31,7 @@ from optisense.optics.scene.emitters import (
 from optisense.optics.scene.lamp_windows import LampWindows
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind, is_coloured
-from optisense.optics.transport.chief_rays import ChiefRays, trace_chief_rays
+from optisense.optics.transport.chief_rays import ChiefRays, RayOutcome, trace_chief_rays
 from optisense.optics.transport.emission_guide import uniform_guide
 from optisense.optics.transport.photon_map import SURFACE_SHIFT, PhotonMap
 from optisense.optics.transport.photons import Emission, trace_photons
@@ -171,6 +171,23 @@ def pixel_middles(camera: RayCamera) -> tuple[mi.UInt32, mi.Point2f]:
     pixel = dr.arange(mi.UInt32, camera.width * camera.height)
     width = camera.width
     return pixel, mi.Point2f(mi.Float(pixel % width) + 0.5, mi.Float(pixel // width) + 0.5)
+
+
+def rays_that_hit(points: np.ndarray, region: np.ndarray | Region = Region.SENSING) -> ChiefRays:
+    """Chief rays straight down that hit points (h, w, 3), in one region or in a map (h, w)."""
+    shape = points.shape[:2]
+    up = np.broadcast_to(np.array([0.0, 0.0, 1.0], np.float32), points.shape)
+    return ChiefRays(
+        points=points,
+        normals=up,
+        directions=-up,
+        incidence=np.ones(shape, np.float32),
+        outcome=np.full(shape, RayOutcome.HIT, np.uint8),
+        face=np.zeros(shape, np.int64),
+        region=np.broadcast_to(region, shape).astype(np.uint8),
+        mirrors=np.zeros(shape, np.uint32),
+        reflections=np.zeros(shape, np.uint32),
+    )
 
 
 def diffuse_coating(reflectance: float) -> Surface:

@@ -45,9 +45,13 @@ def draft(mini: SensorDesign) -> DraftModel:
     return DraftModel(mini)
 
 
-def agree(one: OpticalModel, other: OpticalModel) -> None:
-    a, b = (blocks(model.render(PRESS, SIZE, photons=PHOTONS).radiance) for model in (one, other))
+def look_alike(one: ots.TactileImage, other: ots.TactileImage) -> None:
+    a, b = blocks(one.radiance), blocks(other.radiance)
     np.testing.assert_allclose(a, b, atol=SAME * b.mean(axis=0).max())
+
+
+def agree(one: OpticalModel, other: OpticalModel) -> None:
+    look_alike(*(model.render(PRESS, SIZE, photons=PHOTONS) for model in (one, other)))
 
 
 def test_a_draft_is_the_same_picture(draft: DraftModel, ordinary: OpticalModel) -> None:
@@ -161,8 +165,7 @@ def test_a_light_that_is_dragged_far_looks_as_in_a_draft_of_its_own(
         dragged = draft.render(PRESS, SIZE, photons=PHOTONS)
     assert dragged.settings["kept_view"]
     own = DraftModel(moved).render(PRESS, SIZE, photons=PHOTONS)
-    a, b = blocks(dragged.radiance), blocks(own.radiance)
-    np.testing.assert_allclose(a, b, atol=SAME * b.mean(axis=0).max())
+    look_alike(dragged, own)
 
 
 @pytest.mark.parametrize("field", sorted(SensorDesign.model_fields.keys() - {"lights"}))
@@ -241,8 +244,7 @@ def test_bent_media_are_resolved_when_the_draft_is_asked_for_again(
     again = draft.render(PRESS, SIZE, photons=PHOTONS)
     assert not again.settings["kept_media"]
     assert draft._store.cells is not cells, "those of the shape before were kept until then"
-    a, b = blocks(bent.radiance), blocks(again.radiance)
-    np.testing.assert_allclose(a, b, atol=SAME * b.mean(axis=0).max())
+    look_alike(bent, again)
 
 
 def test_a_contact_that_the_skin_carries_is_not_pressed_anew(
@@ -264,8 +266,7 @@ def test_a_contact_that_the_skin_carries_is_not_pressed_anew(
     assert draft._pressed is pressed and carried.settings["kept_view"]
     anew = press(0.4)
     assert draft._pressed is not pressed and not anew.settings["kept_view"]
-    a, b = blocks(carried.radiance), blocks(anew.radiance)
-    np.testing.assert_allclose(a, b, atol=SAME * b.mean(axis=0).max())
+    look_alike(carried, anew)
     pressed = draft._pressed
     press(0.6, aside=1.0)
     assert draft._pressed is not pressed, "the contact left its place on the skin"

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from media_chain import ACRYLIC, GEL, area, ball, box, check_chain, in_box, pairs
+from media_chain import ACRYLIC, GEL, area, ball, box, check_chain, first_of, in_box, pairs
 
 from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh
@@ -34,13 +34,8 @@ def test_gel_on_acrylic_with_other_triangles_on_their_common_face(
     shared = next(face for face in interfaces if face.names == ("gel", "guide"))
     np.testing.assert_allclose(shared.mesh.face_normals @ [0, 0, 1], -1.0)
     assert shared.roughness == 0.1
-
-    def truth(p: np.ndarray) -> float:
-        if in_box(p, (-3, -2, 0), (3, 2, 2)):
-            return GEL
-        return ACRYLIC if in_box(p, (-3, -2, -2), (3, 2, 0)) else 1.0
-
-    check_chain(interfaces, truth)
+    boxes = ((-3, -2, 0), (3, 2, 2), GEL), ((-3, -2, -2), (3, 2, 0), ACRYLIC)
+    check_chain(interfaces, first_of(*boxes))
 
 
 def test_faces_that_overlap_in_part_are_cut_at_the_rim() -> None:
@@ -51,13 +46,8 @@ def test_faces_that_overlap_in_part_are_cut_at_the_rim() -> None:
     assert area(interfaces, "gel", "guide") == pytest.approx(common)
     assert area(interfaces, "guide") == pytest.approx(2 * (24 + 12 + 8) - common)
     assert area(interfaces, "gel") == pytest.approx(2 * (22.5 + 10 + 9) - common)
-
-    def truth(p: np.ndarray) -> float:
-        if in_box(p, (-1, -3, 0), (4, 1.5, 2)):
-            return GEL
-        return ACRYLIC if in_box(p, (-3, -2, -2), (3, 2, 0)) else 1.0
-
-    check_chain(interfaces, truth)
+    boxes = ((-1, -3, 0), (4, 1.5, 2), GEL), ((-3, -2, -2), (3, 2, 0), ACRYLIC)
+    check_chain(interfaces, first_of(*boxes))
 
 
 def test_turned_faces_and_a_corner_that_touches_two_parts() -> None:
@@ -77,13 +67,10 @@ def test_turned_faces_and_a_corner_that_touches_two_parts() -> None:
         pytest.approx(12)
     )
     assert area(interfaces, "left", "right") == pytest.approx(6)
+    beside = first_of(((-4, -3, -1), (0, 3, 0), ACRYLIC), ((0, -3, -1), (4, 3, 0), 1.54))
 
     def truth(p: np.ndarray) -> float:
-        if in_box(turn.T @ p, (-2, -1.5, 0), (2, 1.5, 1.5)):
-            return GEL
-        if in_box(p, (-4, -3, -1), (0, 3, 0)):
-            return ACRYLIC
-        return 1.54 if in_box(p, (0, -3, -1), (4, 3, 0)) else 1.0
+        return GEL if in_box(turn.T @ p, (-2, -1.5, 0), (2, 1.5, 1.5)) else beside(p)
 
     check_chain(interfaces, truth)
 
@@ -95,7 +82,7 @@ def test_inner_faces_of_three_blocks_of_equal_index_vanish() -> None:
     ]
     interfaces = Media(blocks).interfaces
     assert sum(face.mesh.area for face in interfaces) == pytest.approx(2 * (24 + 24 + 16))
-    check_chain(interfaces, lambda p: 1.5 if in_box(p, (-3, -2, -2), (3, 2, 2)) else 1.0)
+    check_chain(interfaces, first_of(((-3, -2, -2), (3, 2, 2), 1.5)))
 
 
 def test_nested_solids_go_by_priority() -> None:
@@ -121,16 +108,9 @@ def test_where_solids_overlap_the_larger_priority_keeps_the_place(
 ) -> None:
     first = Solid("a", box((-3, -2, -2), (1, 2, 2), (3, 2, 2)), "silicone", GEL, 0.0, priorities[0])
     second = Solid("b", box((-1, -1, -2), (3, 3, 1)), "acrylic", ACRYLIC, 0.0, priorities[1])
-    interfaces = Media([first, second]).interfaces
-
-    def truth(p: np.ndarray) -> float:
-        in_first = in_box(p, (-3, -2, -2), (1, 2, 2))
-        in_second = in_box(p, (-1, -1, -2), (3, 3, 1))
-        if in_first and in_second:
-            return GEL if priorities[0] > priorities[1] else ACRYLIC
-        return GEL if in_first else ACRYLIC if in_second else 1.0
-
-    check_chain(interfaces, truth)
+    boxes = [((-3, -2, -2), (1, 2, 2), GEL), ((-1, -1, -2), (3, 3, 1), ACRYLIC)]
+    truth = first_of(*(boxes if priorities[0] > priorities[1] else boxes[::-1]))
+    check_chain(Media([first, second]).interfaces, truth)
 
 
 def test_overlap_without_priority_names_both_parts_and_the_place() -> None:
@@ -145,12 +125,8 @@ def test_overlap_without_priority_names_both_parts_and_the_place() -> None:
 def test_overlap_of_equal_media_needs_no_priority() -> None:
     first = Solid("a", box((-3, -2, -2), (1, 2, 2)), "acrylic", ACRYLIC)
     second = Solid("b", box((-1, -1, -2), (3, 3, 1)), "acrylic", ACRYLIC)
-
-    def truth(p: np.ndarray) -> float:
-        inside = in_box(p, (-3, -2, -2), (1, 2, 2)) or in_box(p, (-1, -1, -2), (3, 3, 1))
-        return ACRYLIC if inside else 1.0
-
-    check_chain(Media([first, second]).interfaces, truth)
+    boxes = ((-3, -2, -2), (1, 2, 2), ACRYLIC), ((-1, -1, -2), (3, 3, 1), ACRYLIC)
+    check_chain(Media([first, second]).interfaces, first_of(*boxes))
 
 
 @pytest.mark.parametrize("as_solid", [False, True])
@@ -165,13 +141,8 @@ def test_a_thin_film_of_air_is_kept(as_solid: bool) -> None:
     interfaces = Media(solids).interfaces
     assert {(f.ior_inside, f.ior_outside) for f in interfaces} == {(GEL, 1.0), (ACRYLIC, 1.0)}
     assert sum(f.mesh.area for f in interfaces) == pytest.approx(4 * 36 + 24 * (4 - film))
-
-    def truth(p: np.ndarray) -> float:
-        if in_box(p, (-3, -3, film), (3, 3, 2)):
-            return GEL
-        return ACRYLIC if in_box(p, (-3, -3, -2), (3, 3, 0)) else 1.0
-
-    check_chain(interfaces, truth)
+    boxes = ((-3, -3, film), (3, 3, 2), GEL), ((-3, -3, -2), (3, 3, 0), ACRYLIC)
+    check_chain(interfaces, first_of(*boxes))
 
 
 @pytest.mark.parametrize("gap", [-0.001, 0.0015])

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from media_chain import ACRYLIC, GEL, area, box, check_chain, in_box
+from media_chain import ACRYLIC, GEL, area, box, check_chain, first_of
 
 from optisense.geometry import TriangleMesh
 from optisense.geometry.rays import ray_hits
@@ -82,12 +82,7 @@ def test_a_coating_replaces_the_gel_faces_under_it() -> None:
     skin = TriangleMesh(mesh.vertices, mesh.faces[top])
     other_skin = TriangleMesh.grid((6, 6), (5, 4), height=2.0).flipped()
     guide = Solid("guide", box((-4, -4, -1), (4, 4, 0)), "acrylic", ACRYLIC)
-
-    def truth(p: np.ndarray) -> float:
-        if in_box(p, (-3, -3, 0), (3, 3, 2)):
-            return GEL
-        return ACRYLIC if in_box(p, (-4, -4, -1), (4, 4, 0)) else 1.0
-
+    truth = first_of(((-3, -3, 0), (3, 3, 2), GEL), ((-4, -4, -1), (4, 4, 0), ACRYLIC))
     for coating in (skin, other_skin):
         interfaces = Media(
             [Solid("gel", mesh, "silicone", GEL), guide], [Sheet("skin", coating)]

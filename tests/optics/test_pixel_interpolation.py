@@ -5,34 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from comparing import same_light
+from reference_scenes import rays_that_hit
 
 from optisense import Contact, OpticalModel, Sphere, set_value
 from optisense.optics.imaging import cached
 from optisense.optics.imaging._pixel_interpolation import agreed, between_rays, fill
-from optisense.optics.transport.chief_rays import ChiefRays
 from optisense.sensors import build
-
-
-def rays_onto(points: np.ndarray) -> ChiefRays:
-    shape = points.shape[:2]
-    up = np.broadcast_to(np.array([0.0, 0.0, 1.0], np.float32), points.shape)
-    return ChiefRays(
-        points=points,
-        normals=up,
-        directions=-up,
-        incidence=np.ones(shape, np.float32),
-        outcome=np.zeros(shape, np.uint8),
-        face=np.zeros(shape, np.int64),
-        region=np.ones(shape, np.uint8),
-        mirrors=np.zeros(shape, np.uint32),
-        reflections=np.zeros(shape, np.uint32),
-    )
 
 
 @pytest.mark.parametrize("shape", [(8, 10), (9, 11), (7, 6)])
 def test_a_linear_picture_is_filled_exactly(shape: tuple[int, int]) -> None:
     y, x = np.mgrid[: shape[0], : shape[1]].astype(np.float32)
-    rays = rays_onto(np.stack([x, y, 0 * x], axis=-1))
+    rays = rays_that_hit(np.stack([x, y, 0 * x], axis=-1))
     picture = np.stack([10 + 0.1 * x + 0.2 * y, 5 - 0.1 * x])[..., None].repeat(3, axis=-1)
     where = between_rays(rays, np.ones(shape, bool))
     # All but the even pixels, and those at the far borders that have none beyond them.
@@ -47,7 +31,7 @@ def test_a_linear_picture_is_filled_exactly(shape: tuple[int, int]) -> None:
 def test_edges_of_what_is_seen_and_of_shadows_are_not_filled() -> None:
     y, x = np.mgrid[:20, :30].astype(np.float32)
     step = np.where(x > 12, 8.0, 0.0).astype(np.float32)
-    rays = rays_onto(np.stack([x + step, y, step], axis=-1))
+    rays = rays_that_hit(np.stack([x + step, y, step], axis=-1))
     rays.outcome[5:9] = 1
     where = between_rays(rays, np.ones(x.shape, bool))
     assert not where[:, 13].any()

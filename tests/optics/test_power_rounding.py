@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import drjit as dr
+import mitsuba as mi
 import numpy as np
 import pytest
 
 from optisense import OpticalModel
 from optisense.design import set_value
-from optisense.optics.backend.variant import use_variant
+from optisense.optics.radiance_cache._power_rounding import (
+    LEAST_QUANTA,
+    QUANTA_PER_PHOTON,
+    PowerRounding,
+)
 from optisense.sensors import build
 
 PHOTONS = 300_000
@@ -20,15 +25,6 @@ POWER = 3.7e-6
 @pytest.mark.parametrize("weight", [1e-5, 0.02, 1.0, 50.0])
 def test_rounding_keeps_the_mean_power(weight: float) -> None:
     """Of photons weaker than a quantum, too."""
-    use_variant("llvm")
-    import mitsuba as mi
-
-    from optisense.optics.radiance_cache._power_rounding import (
-        LEAST_QUANTA,
-        QUANTA_PER_PHOTON,
-        PowerRounding,
-    )
-
     count = 1_000_000
     rounding = PowerRounding.of(POWER, mi.sample_tea_32(dr.arange(mi.UInt32, count), mi.UInt32(7)))
     power = dr.full(mi.Float, weight * POWER, count)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from reference_scenes import diffuse_coating, floor
 
 from optisense.geometry import TriangleMesh
-from optisense.optics.backend.variant import use_variant
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.scene.ray_scene import Piece, RayScene
-from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind
+from optisense.optics.scene.surfaces import Surface, SurfaceKind
 from optisense.optics.transport._ray_edges import Discontinuity
 from optisense.optics.transport.ray_gradient import DifferentiableRays
 
@@ -17,11 +17,6 @@ WIDTH, HEIGHT = 96, 72
 HALF = 10.0
 """Half of the width (mm) of the camera's picture on the skin 10 mm below it (90 degrees)."""
 PIXEL = 2 * HALF / WIDTH
-
-
-@pytest.fixture(autouse=True, scope="module")
-def _renderer() -> None:
-    use_variant("llvm")
 
 
 def camera(x: float = 0.0, fov: float = 90.0) -> RayCamera:
@@ -41,12 +36,7 @@ def tilted(mesh: TriangleMesh, slope: float) -> TriangleMesh:
     return mesh.with_vertices(moved)
 
 
-SKIN = Piece(
-    "skin",
-    flat((100.0, 100.0), (0.0, 0.0, 0.0)).vertices,
-    flat((100.0, 100.0), (0.0, 0.0, 0.0)).faces,
-    Surface(SurfaceKind.OPAQUE, region=Region.SENSING),
-)
+SKIN = floor(diffuse_coating(0.5), 50.0)
 
 
 def traced(

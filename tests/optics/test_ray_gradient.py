@@ -9,7 +9,6 @@ from optisense.design.lenses import LensDistortion
 from optisense.design.lenses.distortion import BrownConrady, KannalaBrandt
 from optisense.errors import RenderError
 from optisense.geometry import TriangleMesh
-from optisense.optics.backend.variant import use_variant
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind
@@ -24,11 +23,6 @@ CLOSE = 0.015
 CANCELS = 0.002
 """Of the rays that arrive: what comes into view on one side leaves it on the other, and only the
 sum is compared. A mm, and `unit` times that for what moves rays by as much as `unit` mm."""
-
-
-@pytest.fixture(autouse=True, scope="module")
-def _renderer() -> None:
-    use_variant("llvm")
 
 
 def mirror(bend: float = 0.02) -> TriangleMesh:

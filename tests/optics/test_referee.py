@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from reference_scenes import (
     Colour,
-    ReferenceScene,
     diffuse_coating,
     metal_coating,
     referee_scene,
@@ -46,12 +45,8 @@ PASSES, PER_LIGHT = 3, 250_000
 POOLED_PHOTONS = 400_000
 
 
-def scene(coating: Surface, slab: bool = True, lights: str = "area") -> ReferenceScene:
-    return referee_scene(coating, slab, lights)
-
-
 def pairwise_mean(coating: Surface, slab: bool = True, lights: str = "area") -> float:
-    layers, _ = scene(coating, slab, lights).pairwise(PASSES, PER_LIGHT, radius=RADIUS)
+    layers, _ = referee_scene(coating, slab, lights).pairwise(PASSES, PER_LIGHT, radius=RADIUS)
     return float(layers.sum(axis=0).mean())
 
 
@@ -99,9 +94,9 @@ def test_light_embedded_in_the_gel_is_counted_once(mean: Callable[..., float]) -
 def test_exported_scenes_still_render_as_recorded(name: str) -> None:
     coating = {"metal": METAL, "blend": BLEND}.get(name, diffuse_coating(0.7))
     lights = "embedded" if name == "embedded" else "area"
-    got = float(scene(coating, True, lights).path(32).mean())
+    got = float(referee_scene(coating, True, lights).path(32).mean())
     assert got == pytest.approx(PATH[name], rel=SHORT_PATH)
 
 
 def test_path_sees_no_point_light_through_smooth_glass() -> None:
-    assert np.all(scene(diffuse_coating(0.7), lights="point").path(4) == 0.0)
+    assert np.all(referee_scene(diffuse_coating(0.7), lights="point").path(4) == 0.0)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from reference_scenes import rays_that_hit
 
 from optisense.optics.imaging.sampling import PixelRegions, SamplingPlan
 from optisense.optics.scene.surfaces import Region
-from optisense.optics.transport.chief_rays import ChiefRays, RayOutcome
 
 WIDTH, HEIGHT = 320, 240
 
@@ -16,20 +16,9 @@ def disc(radius: float) -> PixelRegions:
     """The regions of an image with one round contact of a radius in pixels."""
     rows, columns = np.indices((HEIGHT, WIDTH))
     inside = np.hypot(rows - HEIGHT / 2, columns - WIDTH / 2) < radius
-    vectors = np.zeros((HEIGHT, WIDTH, 3), dtype=np.float32)
-    return PixelRegions.of(
-        ChiefRays(
-            points=vectors,
-            normals=vectors,
-            directions=vectors,
-            incidence=vectors[..., 0],
-            outcome=np.full(inside.shape, RayOutcome.HIT, dtype=np.uint8),
-            face=np.zeros(inside.shape, dtype=np.int64),
-            region=np.where(inside, Region.INDENTER, Region.SENSING).astype(np.uint8),
-            mirrors=np.zeros(inside.shape, dtype=np.uint32),
-            reflections=np.zeros(inside.shape, dtype=np.uint32),
-        )
-    )
+    points = np.zeros((HEIGHT, WIDTH, 3), dtype=np.float32)
+    region = np.where(inside, Region.INDENTER, Region.SENSING)
+    return PixelRegions.of(rays_that_hit(points, region))
 
 
 @pytest.mark.parametrize("radius", [7.0, 9.0, 14.0])

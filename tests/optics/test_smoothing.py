@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
+import drjit as dr
 import numpy as np
 import pytest
 
-from optisense.optics.backend.variant import use_variant
+from optisense.optics.radiance_cache import smoothing
+from optisense.optics.radiance_cache.smoothing import (
+    MAX_RADIUS_RATIO,
+    MIN_RADIUS_CELLS,
+    REFERENCE_DENSITY,
+    REFERENCE_LENGTH,
+    REFERENCE_RADIUS,
+    Kernels,
+    varies_over,
+)
+from optisense.optics.scene.surface_cells import build_cells
 
 SIZE = 0.3
 """Side (mm) of a cell."""
@@ -18,11 +29,7 @@ AT_DEFAULT = 0.0015
 
 
 @pytest.fixture(scope="module")
-def kernels():  # type: ignore[no-untyped-def]
-    use_variant("llvm")
-    from optisense.optics.radiance_cache.smoothing import Kernels
-    from optisense.optics.scene.surface_cells import build_cells
-
+def kernels() -> Kernels:
     corners = np.array([(-8.0, -8, 0), (8, -8, 0), (8, 8, 0), (-8, 8, 0)])
     cells = build_cells(corners, np.array([(0, 1, 2), (0, 2, 3)]), SIZE)
     return Kernels(cells, np.hypot(HEIGHT, np.hypot(*cells.centres[:, :2].T)), DENSITY)
@@ -52,7 +59,7 @@ def as_read(values: np.ndarray, centres: np.ndarray, size: float) -> np.ndarray:
     return grid[tuple(place.T)][:, None]
 
 
-def errors(kernels, photons: int) -> tuple[float, float]:  # type: ignore[no-untyped-def]
+def errors(kernels: Kernels, photons: int) -> tuple[float, float]:
     """Relative error right under the light, without and with sharpening."""
     cells = kernels.cells
     truth = within_cells(cells.centres, SIZE)
@@ -61,10 +68,11 @@ def errors(kernels, photons: int) -> tuple[float, float]:  # type: ignore[no-unt
     sharp = blurred * kernels.sharpening(landed, photons)
     middle = np.hypot(*cells.centres[:, :2].T) < 1.0
     found = (as_read(each, cells.centres, SIZE) for each in (blurred, sharp))
-    return tuple(float((x / truth - 1)[middle].mean()) for x in found)  # type: ignore[return-value]
+    plain, sharpened = (float((x / truth - 1)[middle].mean()) for x in found)
+    return plain, sharpened
 
 
-def test_a_kernel_takes_from_a_peak_what_theory_says(kernels) -> None:  # type: ignore[no-untyped-def]
+def test_a_kernel_takes_from_a_peak_what_theory_says(kernels: Kernels) -> None:
     # The kernel's variance along an axis is r^2 / 6, the Laplacian of (h^2 + x^2 + y^2)^-3/2 on the
     # axis -6 / h^2 of it: half of one times the other.
     radius = kernels.radii(1)[np.hypot(*kernels.cells.centres[:, :2].T).argmin()]
@@ -76,13 +84,13 @@ def test_a_kernel_takes_from_a_peak_what_theory_says(kernels) -> None:  # type: 
     assert (blurred / truth - 1)[nearest, 0] == pytest.approx(expected, rel=0.15)
 
 
-def test_sharpening_undoes_most_of_the_blur(kernels) -> None:  # type: ignore[no-untyped-def]
+def test_sharpening_undoes_most_of_the_blur(kernels: Kernels) -> None:
     plain, sharp = errors(kernels, 5_000_000)
     assert plain < -0.01
     assert abs(sharp) < AT_DEFAULT
 
 
-def test_sharpening_adds_no_power_at_the_edge_of_a_pool_of_light(kernels) -> None:  # type: ignore[no-untyped-def]
+def test_sharpening_adds_no_power_at_the_edge_of_a_pool_of_light(kernels: Kernels) -> None:
     cells = kernels.cells
     pool = np.hypot(*cells.centres[:, :2].T) < 1.5
     landed = (pool * cells.areas)[:, None]
@@ -94,7 +102,7 @@ def test_sharpening_adds_no_power_at_the_edge_of_a_pool_of_light(kernels) -> Non
     assert cells.areas @ sharp == pytest.approx(cells.areas @ smooth, rel=0.01)
 
 
-def test_twicing_undoes_most_of_the_blur_and_leaves_even_light_even(kernels) -> None:  # type: ignore[no-untyped-def]
+def test_twicing_undoes_most_of_the_blur_and_leaves_even_light_even(kernels: Kernels) -> None:
     cells = kernels.cells
     both = kernels.smoothing(5_000_000, corrected=True)
     truth = within_cells(cells.centres, SIZE)
@@ -111,7 +119,7 @@ def test_twicing_undoes_most_of_the_blur_and_leaves_even_light_even(kernels) -> 
     assert even == pytest.approx(np.ones_like(even), rel=1e-6)
 
 
-def test_twicing_of_many_cells_increases_the_noise_as_theory_says(kernels) -> None:  # type: ignore[no-untyped-def]
+def test_twicing_of_many_cells_increases_the_noise_as_theory_says(kernels: Kernels) -> None:
     """2 K - K * K has 1.335 times the norm of K, for Epanechnikov's kernel in the plane."""
     both = kernels.smoothing(1, corrected=True)
     middle = np.hypot(*kernels.cells.centres[:, :2].T) < 1.0
@@ -123,7 +131,7 @@ def test_twicing_of_many_cells_increases_the_noise_as_theory_says(kernels) -> No
 
 
 @pytest.mark.parametrize("photons", [1_000_000, 10_000_000, 40_000_000])
-def test_twicing_undoes_the_blur_of_quadratic_light(kernels, photons: int) -> None:  # type: ignore[no-untyped-def]
+def test_twicing_undoes_the_blur_of_quadratic_light(kernels: Kernels, photons: int) -> None:
     """Its blur is the same everywhere and has a closed form. A kernel of few cells and that which
     undoes it may have other second moments than kernels of many cells."""
     across = kernels.cells.centres[:, 0]
@@ -139,7 +147,7 @@ def test_twicing_undoes_the_blur_of_quadratic_light(kernels, photons: int) -> No
     assert abs(left) < 0.03 * plain
 
 
-def test_the_blur_goes_as_photons_grow(kernels) -> None:  # type: ignore[no-untyped-def]
+def test_the_blur_goes_as_photons_grow(kernels: Kernels) -> None:
     many = (5_000_000, 40_000_000, 320_000_000)
     truth = light(kernels.cells.centres)
     landed = truth * kernels.cells.areas[:, None]
@@ -158,22 +166,14 @@ def test_the_blur_goes_as_photons_grow(kernels) -> None:  # type: ignore[no-unty
     assert sharp[2] < 0.0015
 
 
-def test_even_light_stays_even_up_to_the_edge(kernels) -> None:  # type: ignore[no-untyped-def]
+def test_even_light_stays_even_up_to_the_edge(kernels: Kernels) -> None:
     cells = kernels.cells
     landed = cells.areas[:, None]
     assert kernels.smoothing(1).kernel @ landed == pytest.approx(np.ones_like(landed), rel=1e-6)
     assert kernels.sharpening(landed, 1) == pytest.approx(np.ones_like(landed), rel=1e-6)
 
 
-def test_a_kernel_is_narrower_near_a_lamp_and_no_wider_than_a_cell_allows(kernels) -> None:  # type: ignore[no-untyped-def]
-    from optisense.optics.radiance_cache.smoothing import (
-        MIN_RADIUS_CELLS,
-        REFERENCE_DENSITY,
-        REFERENCE_LENGTH,
-        REFERENCE_RADIUS,
-        Kernels,
-    )
-
+def test_a_kernel_is_narrower_near_a_lamp_and_no_wider_than_a_cell_allows(kernels: Kernels) -> None:
     distance = np.linspace(0.0, REFERENCE_LENGTH, kernels.cells.cells)
     cell = 1 / float(kernels.cells.inverse_size[0])
     radii = Kernels(kernels.cells, distance, DENSITY).radii(round(REFERENCE_DENSITY / DENSITY))
@@ -185,9 +185,7 @@ def test_a_kernel_is_narrower_near_a_lamp_and_no_wider_than_a_cell_allows(kernel
     assert radii[len(radii) // 2] == pytest.approx(REFERENCE_RADIUS * 0.5 ** (2 / 3), rel=1e-3)
 
 
-def test_a_kernel_widens_as_photons_grow_few_up_to_a_limit(kernels) -> None:  # type: ignore[no-untyped-def]
-    from optisense.optics.radiance_cache.smoothing import MAX_RADIUS_RATIO
-
+def test_a_kernel_widens_as_photons_grow_few_up_to_a_limit(kernels: Kernels) -> None:
     usual = kernels.radii(5_000_000)
     assert kernels.radii(2_500_000) == pytest.approx(usual * 2 ** (1 / 6))
     distance = np.hypot(HEIGHT, np.hypot(*kernels.cells.centres[:, :2].T))
@@ -195,17 +193,15 @@ def test_a_kernel_widens_as_photons_grow_few_up_to_a_limit(kernels) -> None:  # 
     assert np.all(kernels.radii(40_000_000) < usual)
 
 
-def test_as_wide_a_kernel_where_half_the_photons_sent_land_as_with_half_of_them(kernels) -> None:  # type: ignore[no-untyped-def]
-    from optisense.optics.radiance_cache.smoothing import Kernels
-
+def test_as_wide_a_kernel_where_half_the_photons_sent_land_as_with_half_of_them(
+    kernels: Kernels,
+) -> None:
     distance = np.full(kernels.cells.cells, 5.0)
     one, other = (Kernels(kernels.cells, distance, d) for d in (DENSITY, DENSITY / 2))
     assert one.radii(1_000_000) == pytest.approx(other.radii(2_000_000))
 
 
-def test_cells_far_from_what_the_camera_sees_keep_their_own_light(kernels) -> None:  # type: ignore[no-untyped-def]
-    from optisense.optics.radiance_cache.smoothing import Kernels
-
+def test_cells_far_from_what_the_camera_sees_keep_their_own_light(kernels: Kernels) -> None:
     cells = kernels.cells
     near = cells.centres[:, 0] < 0.0
     some = Kernels(cells, np.full(cells.cells, 8.0), DENSITY, near)
@@ -219,9 +215,7 @@ def test_cells_far_from_what_the_camera_sees_keep_their_own_light(kernels) -> No
     assert np.all(some.sharpening(landed, 1)[~near] == 1.0)
 
 
-def test_light_of_a_lamp_varies_over_its_distance(kernels) -> None:  # type: ignore[no-untyped-def]
-    from optisense.optics.radiance_cache.smoothing import varies_over
-
+def test_light_of_a_lamp_varies_over_its_distance(kernels: Kernels) -> None:
     cells = kernels.cells
     halves = np.array([light(cells.centres) * cells.areas[:, None]] * 2)
     found = varies_over(cells, halves, np.full(cells.cells, 1.0))
@@ -230,9 +224,7 @@ def test_light_of_a_lamp_varies_over_its_distance(kernels) -> None:  # type: ign
     assert found[nearest] == pytest.approx(HEIGHT, rel=0.2)
 
 
-def test_noise_is_not_taken_for_light_that_varies(kernels) -> None:  # type: ignore[no-untyped-def]
-    from optisense.optics.radiance_cache.smoothing import varies_over
-
+def test_noise_is_not_taken_for_light_that_varies(kernels: Kernels) -> None:
     cells = kernels.cells
     inside = np.abs(cells.centres[:, :2]).max(axis=1) < 4.0
     random = np.random.default_rng(5)
@@ -243,9 +235,7 @@ def test_noise_is_not_taken_for_light_that_varies(kernels) -> None:  # type: ign
     assert (varies_over(cells, noisy[[0, 0]], radii)[inside] < 6.0).mean() > 0.9
 
 
-def test_kernels_are_narrower_along_the_edge_of_a_shadow(kernels) -> None:  # type: ignore[no-untyped-def]
-    from optisense.optics.radiance_cache.smoothing import Kernels
-
+def test_kernels_are_narrower_along_the_edge_of_a_shadow(kernels: Kernels) -> None:
     cells = kernels.cells
     lit = np.where(cells.centres[:, :1] > 0.0, 1.0, 0.3) * cells.areas[:, None]
     distance = np.full(cells.cells, 10.0)
@@ -259,15 +249,11 @@ def test_kernels_are_narrower_along_the_edge_of_a_shadow(kernels) -> None:  # ty
 
 @pytest.mark.parametrize("cached", [0.0, 1e9])
 def test_products_do_not_depend_on_the_number_of_threads(
-    kernels,  # type: ignore[no-untyped-def]
+    kernels: Kernels,
     monkeypatch: pytest.MonkeyPatch,
     cached: float,
 ) -> None:
     """By blocks of columns, of which the last is shorter, and by rows."""
-    import drjit as dr
-
-    from optisense.optics.radiance_cache import smoothing
-
     monkeypatch.setattr(smoothing, "LEAST_SHARED_PRODUCT", 0)
     monkeypatch.setattr(smoothing, "CACHED_BYTES", cached)
     monkeypatch.setattr(smoothing, "BLOCK_COLUMNS", 5)

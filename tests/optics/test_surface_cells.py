@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 import pytest
 
-from optisense.optics.backend.variant import use_variant
+from optisense.geometry.mesh_points import surface_samples
+from optisense.optics.radiance_cache.smoothing import Kernels
+from optisense.optics.scene.surface_cells import build_cells, cell_at
 
 RADIUS = 6.0
 SIZE = 0.5
@@ -40,9 +44,6 @@ def rings(sectors: int, count: int) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("mesh", [fan(400), rings(90, 40)], ids=["fan", "rings"])
 def test_areas_are_true_where_many_thin_faces_meet(mesh: tuple[np.ndarray, np.ndarray]) -> None:
-    use_variant("llvm")
-    from optisense.optics.scene.surface_cells import build_cells
-
     cells = build_cells(*mesh, SIZE)
     assert cells.areas.sum() == pytest.approx(np.pi * RADIUS**2, rel=1e-3)
     whole = np.hypot(*cells.centres[:, :2].T) < RADIUS - SIZE
@@ -52,9 +53,6 @@ def test_areas_are_true_where_many_thin_faces_meet(mesh: tuple[np.ndarray, np.nd
 
 
 def test_triangles_without_area_make_no_cells() -> None:
-    use_variant("llvm")
-    from optisense.optics.scene.surface_cells import build_cells
-
     points, faces = fan(400)
     far = np.array([[50.0, 0.0, 0.0], [60.0, 0.0, 0.0], [70.0, 0.0, 0.0]])
     last = len(points)
@@ -72,9 +70,6 @@ def corner() -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_a_crease_divides_the_cells_that_it_runs_through() -> None:
-    use_variant("llvm")
-    from optisense.optics.scene.surface_cells import build_cells
-
     cells = build_cells(*corner(), SIZE)
     assert cells.creased
     assert cells.areas.sum() == pytest.approx(8 * 8 + 8 * 3, rel=1e-3)
@@ -89,14 +84,6 @@ def test_a_crease_divides_the_cells_that_it_runs_through() -> None:
 
 
 def test_light_on_a_top_is_not_averaged_with_the_dark_wall_beside_it() -> None:
-    use_variant("llvm")
-    import drjit as dr
-    import mitsuba as mi
-
-    from optisense.geometry.mesh_points import surface_samples
-    from optisense.optics.radiance_cache.smoothing import Kernels
-    from optisense.optics.scene.surface_cells import build_cells, cell_at
-
     points, faces = corner()
     cells = build_cells(points, faces, SIZE)
     landings, owner, power = surface_samples(points, faces, 0.02)
@@ -114,9 +101,6 @@ def test_light_on_a_top_is_not_averaged_with_the_dark_wall_beside_it() -> None:
 
 
 def test_two_sides_of_a_sheet_are_one_cell() -> None:
-    use_variant("llvm")
-    from optisense.optics.scene.surface_cells import build_cells
-
     points, faces = fan(60)
     cells = build_cells(points, np.concatenate([faces, faces[:, ::-1]]), SIZE)
     assert not cells.creased

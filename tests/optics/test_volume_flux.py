@@ -8,11 +8,12 @@ import mitsuba as mi
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from reference_scenes import diffuse_coating, quad
+from reference_scenes import diffuse_coating, floor, quad
 
 from optisense.geometry import Sphere
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging.cached import render_cached
+from optisense.optics.imaging.sampling import SamplingPlan
 from optisense.optics.radiance_cache.lit_scene import LitScene
 from optisense.optics.radiance_cache.store import CacheStore
 from optisense.optics.radiance_cache.tracing_limits import TracingLimits
@@ -61,8 +62,7 @@ BELOW_CEILING = RayCamera((0.0, 0.0, 7.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0), 40
 
 
 def coating(region: Region, reflectance: float = REFLECTANCE) -> Surface:
-    plain = diffuse_coating(reflectance)
-    return Surface(**{**plain.__dict__, "region": region})
+    return replace(diffuse_coating(reflectance), region=region)
 
 
 def ball(reflectance: float = REFLECTANCE) -> Piece:
@@ -73,8 +73,7 @@ def ball(reflectance: float = REFLECTANCE) -> Piece:
 
 
 def skin(reflectance: float = REFLECTANCE) -> Piece:
-    corners = [(-10, -10, 0), (10, -10, 0), (10, 10, 0), (-10, 10, 0)]
-    return quad("skin", corners, coating(Region.SENSING, reflectance))
+    return floor(coating(Region.SENSING, reflectance))
 
 
 def ceiling() -> Piece:
@@ -142,9 +141,24 @@ def picture(
     guide = rays if guided_by is None else trace_chief_rays(full, guided_by)
     light = store(fixed, lamp, guide.points[guide.hit])
     cache = light.radiance_cache(0, TracingLimits(photons), lambda *told: None)
-    return render_cached(cache, scenes, camera, rays, LampWindows.of([lamp]), 0).radiance[
-        0, ..., 0
-    ], rays
+    windows, plan = LampWindows.of([lamp]), SamplingPlan()
+    layers = render_cached(cache, scenes, camera, rays, windows, 0, plan, None, None)
+    return layers.radiance[0, ..., 0], rays
+
+
+def of_flank(
+    found: tuple[NDArray[np.floating], ChiefRays], side: float = 1.0, factor: float = 1.0
+) -> tuple[float, NDArray[np.floating], NDArray[np.floating]]:
+    """The mean radiance, the points and the normals of a ball's flank, on one side of it along x;
+    lengths are divided by a factor.
+    """
+    image, rays = found
+    normals, points = rays.normals.astype(float), rays.points.astype(float) / factor
+    across = side * normals[..., 0]
+    flank = (rays.region == Region.INDENTER) & (across > 0.3)
+    flank &= (np.abs(normals[..., 1]) < across) & (points[..., 2] > ABOVE_RIM)
+    assert flank.sum() > 50
+    return float(image[flank].mean()), points[flank], normals[flank]
 
 
 @pytest.mark.parametrize(
@@ -162,13 +176,9 @@ def test_cells_of_a_large_skin_grow_with_the_distance_of_the_lamp(
 
 @pytest.mark.parametrize("camera", [CAMERA, OBLIQUE])
 def test_raised_flank_in_grazing_light_is_lit_as_in_the_open(camera: RayCamera) -> None:
-    image, rays = picture([skin()], ball(), camera, PHOTONS, guided_by=CAMERA)
-    normals, points = rays.normals.astype(float), rays.points.astype(float)
-    flank = (rays.region == Region.INDENTER) & (normals[..., 0] > 0.3)
-    flank &= (np.abs(normals[..., 1]) < normals[..., 0]) & (points[..., 2] > ABOVE_RIM)
-    assert flank.sum() > 50
-    wanted = REFLECTANCE / np.pi * irradiance(points[flank], normals[flank]).mean()
-    assert image[flank].mean() == pytest.approx(wanted, rel=AGREEMENT)
+    got, *places = of_flank(picture([skin()], ball(), camera, PHOTONS, guided_by=CAMERA))
+    wanted = REFLECTANCE / np.pi * irradiance(*places).mean()
+    assert got == pytest.approx(wanted, rel=AGREEMENT)
 
 
 @pytest.mark.parametrize("extent", [9.5, 4.0])
@@ -182,24 +192,17 @@ def test_raised_flank_on_a_small_skin_is_lit_as_on_a_large_one(extent: float) ->
     camera = replace(CAMERA, position=(0.0, 0.0, CAMERA.position[2] * factor))
     plate = replace(skin(), vertices=skin().vertices * (extent / 20))
     cap = replace(ball(), vertices=ball().vertices * factor)
-    image, rays = picture([plate], cap, camera, PHOTONS, lamp=lamp)
-    normals, points = rays.normals.astype(float), rays.points.astype(float) / factor
-    flank = (rays.region == Region.INDENTER) & (normals[..., 0] > 0.3)
-    flank &= (np.abs(normals[..., 1]) < normals[..., 0]) & (points[..., 2] > ABOVE_RIM)
-    assert flank.sum() > 50
-    wanted = REFLECTANCE / np.pi * irradiance(points[flank], normals[flank]).mean() / factor**2
-    assert image[flank].mean() == pytest.approx(wanted, rel=SMALL_AGREEMENT)
+    got, *places = of_flank(picture([plate], cap, camera, PHOTONS, lamp=lamp), factor=factor)
+    wanted = REFLECTANCE / np.pi * irradiance(*places).mean() / factor**2
+    assert got == pytest.approx(wanted, rel=SMALL_AGREEMENT)
 
 
 def test_a_flank_is_lit_by_the_foot_of_a_white_wall() -> None:
     """Light that rises from the foot of the wall to the flank lands nowhere on the skin."""
-    image, rays = picture([skin(), wall()], ball(), CAMERA, PHOTONS, guided_by=CAMERA)
-    normals, points = rays.normals.astype(float), rays.points.astype(float)
-    flank = (rays.region == Region.INDENTER) & (normals[..., 0] < -0.3)
-    flank &= (np.abs(normals[..., 1]) < -normals[..., 0]) & (points[..., 2] > ABOVE_RIM)
-    assert flank.sum() > 50
-    wanted = REFLECTANCE / np.pi * from_wall(points[flank], normals[flank]).mean()
-    assert image[flank].mean() == pytest.approx(wanted, rel=AGREEMENT)
+    found = picture([skin(), wall()], ball(), CAMERA, PHOTONS, guided_by=CAMERA)
+    got, *places = of_flank(found, side=-1.0)
+    wanted = REFLECTANCE / np.pi * from_wall(*places).mean()
+    assert got == pytest.approx(wanted, rel=AGREEMENT)
 
 
 def test_a_black_ceiling_that_shades_nothing_leaves_the_image_as_it_is() -> None:
