@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 from optisense.design import SensorDesign
 from optisense.design.arrangement import COINCIDENCE_TOLERANCE
@@ -96,24 +96,30 @@ class ShapeCache:
     """Cache of shapes by their inputs; meshes are recognised by identity.
 
     Attributes:
+        before: the cache of a similar design, whose shapes are reused; None if there is none.
         made: the inputs and the result of each shape.
         cut: the meshes that were cut out of others.
         bend: whether those cut out of a mesh that bends are moved along instead of being cut again.
     """
 
+    before: Self | None = None
     made: list[tuple[tuple[Any, ...], Any]] = field(default_factory=list)
     cut: list[Cutting] = field(default_factory=list)
     bend: bool = False
 
-    def get_or_make(self, before: ShapeCache, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:
-        """Return the result of ``make``, which is kept for further calls with the same key."""
-        known = next((value for old, value in before.made if old == key), None)
+    @property
+    def earlier(self) -> Self:
+        """The cache of the similar design; an empty one if there is none."""
+        return self.before or type(self)()
+
+    def get_or_make(self, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:
+        """Return the result of ``make``, or the known one of the same key."""
+        known = next((value for old, value in self.earlier.made if old == key), None)
         self.made.append((key, make() if known is None else known))
         return self.made[-1][1]
 
     def get_or_cut(
         self,
-        before: ShapeCache,
         name: tuple[Any, ...],
         whole: TriangleMesh,
         others: tuple[TriangleMesh, ...],
@@ -122,21 +128,14 @@ class ShapeCache:
         """Return the pieces of a mesh that ``make`` cuts; those that are known are reused.
 
         Args:
-            before: the cache of a similar design.
             name: name of the cutting.
             others: the meshes that divide the whole one.
         """
-        inputs = name, whole, *others
-        known = next(
-            (
-                each
-                for each in before.cut
-                if each.inputs == inputs and (self.bend or each.source is None)
-            ),
-            None,
-        )
+        inputs, cut = (name, whole, *others), self.earlier.cut
+        same = (each for each in cut if each.inputs == inputs)
+        known = next((each for each in same if self.bend or each.source is None), None)
         if known is None and self.bend:
-            named = (each.moved(inputs, whole) for each in before.cut if each.name == name)
+            named = (each.moved(inputs, whole) for each in cut if each.name == name)
             known = next((each for each in named if each is not None), None)
         self.cut.append(Cutting(inputs, name, whole, make()) if known is None else known)
         return self.cut[-1].pieces
@@ -146,16 +145,13 @@ def finishes_of(
     design: SensorDesign,
     meshes: dict[str, TriangleMesh],
     sheets: Sequence[Sheet],
-    kept: ShapeCache,
-    before: ShapeCache,
+    shapes: ShapeCache,
 ) -> tuple[list[Frost], list[Paint]]:
     """Return the frosted and the painted faces of a design.
 
     Args:
         meshes: the design's parts in their current shape.
         sheets: the opaque parts, which cover paint and frost where they lie on the same faces.
-        kept: cache to which the shapes are added.
-        before: cache of a similar design, whose shapes are reused.
 
     Raises:
         DesignError: no triangle matches the design's description of the faces, or a sheet covers
@@ -178,7 +174,7 @@ def finishes_of(
         def bare(mesh: TriangleMesh = mesh, chosen: Any = chosen) -> list[TriangleMesh]:
             return [_uncovered(mesh.with_faces(mesh.faces[chosen]).compacted(), sheets)]
 
-        (patch,) = kept.get_or_cut(before, key, mesh, covers, bare)
+        (patch,) = shapes.get_or_cut(key, mesh, covers, bare)
         if not len(patch.faces):
             raise DesignError(
                 f"the coating, or another opaque part, covers all of the faces {name}",
@@ -188,7 +184,7 @@ def finishes_of(
         if finish.paint is None:
             frosts.append(Frost(f"{part}.{label}", part, patch, float(finish.roughness or 0.0)))
             continue
-        inward = kept.get_or_make(before, (patch, "flipped"), patch.flipped)
+        inward = shapes.get_or_make((patch, "flipped"), patch.flipped)
         paints.append(Paint(Sheet(f"{part}.{label}", inward, "paint"), part, finish.paint))
     return frosts, paints
 
@@ -205,8 +201,7 @@ def frosted(
     interface: Interface,
     frosts: Sequence[Frost],
     solids: Sequence[Solid],
-    kept: ShapeCache,
-    before: ShapeCache,
+    shapes: ShapeCache,
 ) -> Iterator[tuple[str, Interface]]:
     """Divide an interface into the parts on frosted faces, and the rest.
 
@@ -229,7 +224,7 @@ def frosted(
 
     key = (*interface.names, interface.outside, *(frost.name for frost in own))
     patches = tuple(frost.mesh for frost in own)
-    *rough, rest = kept.get_or_cut(before, key, interface.mesh, patches, pieces)
+    *rough, rest = shapes.get_or_cut(key, interface.mesh, patches, pieces)
     for frost, mesh in zip(own, rough, strict=True):
         others = [
             s.roughness for s in solids if s.name in interface.names and s.name != frost.solid

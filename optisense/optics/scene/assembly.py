@@ -70,30 +70,30 @@ class Assembly:
 
 
 @dataclass
-class AssemblyCache:
+class AssemblyCache(ShapeCache):
     """Shapes computed from meshes, with the meshes that they were computed from, which are
     recognised by identity.
     """
 
-    finishes: ShapeCache = field(default_factory=ShapeCache)
     merged: list[tuple[TriangleMesh, TriangleMesh]] = field(default_factory=list)
     pieces: list[tuple[TriangleMesh, Piece]] = field(default_factory=list)
     beside: dict[str, NDArray[np.int64]] = field(default_factory=dict)
     """Numbers (m, 2) of the solids in front of and behind each face of each sheet; -1 for air."""
 
-    def merge(self, mesh: TriangleMesh, before: AssemblyCache, bend: bool = False) -> TriangleMesh:
-        """Return a part's mesh with its flat faces merged; unchanged if ``bend`` and an earlier
+    def merge(self, mesh: TriangleMesh) -> TriangleMesh:
+        """Return a part's mesh with its flat faces merged; unchanged if parts bend and an earlier
         mesh with the same faces had no flat ones.
         """
-        known = next((merged for old, merged in before.merged if old is mesh), None)
-        if known is None and bend:
-            bent = (merged is old and same_faces(old, mesh) for old, merged in before.merged)
+        earlier = self.earlier.merged
+        known = next((merged for old, merged in earlier if old is mesh), None)
+        if known is None and self.bend:
+            bent = (merged is old and same_faces(old, mesh) for old, merged in earlier)
             known = mesh if any(bent) else None
         self.merged.append((mesh, _merged(mesh) if known is None else known))
         return self.merged[-1][1]
 
     def media_beside(
-        self, mesh: TriangleMesh, solids: list[Solid], each: bool, before: AssemblyCache
+        self, mesh: TriangleMesh, solids: list[Solid], each: bool
     ) -> NDArray[np.int64]:
         """Return the numbers (m, 2) of the solids in front of and behind each face of a sheet; -1
         for air. Known ones are reused.
@@ -101,41 +101,27 @@ class AssemblyCache:
         Args:
             each: whether they are looked up for each smooth patch of faces; else for the largest
                 face alone.
-            before: the cache of the assembly before.
         """
         places = [part for solid in solids for part in (solid.mesh, solid.priority)]
         key = ("beside", mesh, each, *places)
-        return self.finishes.get_or_make(
-            before.finishes,
-            key,
-            lambda: media_beside(_piece("", mesh, Surface(SurfaceKind.MIRROR)), solids, each),
-        )
+        sheet = Surface(SurfaceKind.MIRROR)
+        return self.get_or_make(key, lambda: media_beside(_piece("", mesh, sheet), solids, each))
 
     def split(
-        self, mesh: TriangleMesh, beside: NDArray[np.int64], before: AssemblyCache
+        self, mesh: TriangleMesh, beside: NDArray[np.int64]
     ) -> list[tuple[tuple[int, int], TriangleMesh]]:
         """Return the parts of a sheet of `split_by_media`; known ones are reused."""
-        return self.finishes.get_or_make(
-            before.finishes,
-            ("split", mesh, beside.tobytes()),
-            lambda: split_by_media(mesh, beside),
-        )
+        key = ("split", mesh, beside.tobytes())
+        return self.get_or_make(key, lambda: split_by_media(mesh, beside))
 
-    def piece(
-        self,
-        name: str,
-        mesh: TriangleMesh,
-        surface: Surface,
-        before: AssemblyCache,
-        merge: bool = False,
-    ) -> Piece:
+    def piece(self, name: str, mesh: TriangleMesh, surface: Surface, merge: bool = False) -> Piece:
         """Return the piece of a mesh and its surface, reused if it is known.
 
         Args:
-            before: the cache of the assembly before.
             merge: whether flat faces are merged, as on a flat side of a curved solid.
         """
-        pieces = (piece for old, piece in (*before.pieces, *self.pieces) if old is mesh)
+        known_pieces = (*self.earlier.pieces, *self.pieces)
+        pieces = (piece for old, piece in known_pieces if old is mesh)
         known = next(pieces, None)
         if known is None or (known.name, known.surface) != (name, surface):
             known = _piece(name, _merged(mesh) if merge else mesh, surface)
@@ -159,11 +145,11 @@ def assemble(design: SensorDesign, before: Assembly | None = None, bend: bool = 
     solids, sheets, pieces, fine = [], [], [], {}
     indices: list[float] = []
     absorptions: list[RGB] = []
-    kept, old = AssemblyCache(), AssemblyCache() if before is None else before.kept
+    kept = AssemblyCache(None if before is None else before.kept, bend=bend)
     for name, part in design.parts.items():
         if name not in meshes:
             raise DesignError(f"part '{name}' has no mesh", where=design.where("parts", name))
-        mesh = kept.merge(meshes[name], old, bend)
+        mesh = kept.merge(meshes[name])
         material = design.materials.get(part.material) if part.material else None
         if part.role in TRANSPARENT_SOLIDS:
             medium = _medium(design, name, material)
@@ -182,11 +168,10 @@ def assemble(design: SensorDesign, before: Assembly | None = None, bend: bool = 
             )
         elif part.role is Role.INTERFACE:
             medium = _medium(design, name, material)
-            pieces.append(kept.piece(name, mesh, _refracting_sheet(medium, design), old))
+            pieces.append(kept.piece(name, mesh, _refracting_sheet(medium, design)))
         elif part.role is not Role.INDENTER:
             sheets.append(Sheet(name, mesh, part.role.value))
-    kept.finishes.bend = bend
-    frosts, paints = finishes_of(design, meshes, sheets, kept.finishes, old.finishes)
+    frosts, paints = finishes_of(design, meshes, sheets, kept)
     covers = {sheet.name: design.parts[sheet.name].material for sheet in sheets}
     covers |= {paint.sheet.name: paint.material for paint in paints}
     sheets += [paint.sheet for paint in paints]
@@ -196,34 +181,35 @@ def assemble(design: SensorDesign, before: Assembly | None = None, bend: bool = 
         bent = before.media.bend(solids, sheets) if before is not None and bend else None
         media = Media(solids, sheets) if bent is None else bent
     for whole in media.interfaces:
-        for frost, face in frosted(whole, frosts, solids, kept.finishes, old.finishes):
+        for frost, face in frosted(whole, frosts, solids, kept):
             name = "/".join(face.names) + "|" + face.outside + (frost and f":{frost}")
-            pieces.append(kept.piece(name, face.mesh, _interface_surface(face), old, merge=True))
+            pieces.append(kept.piece(name, face.mesh, _interface_surface(face), merge=True))
     around = [*solids, AROUND]
     for sheet in sheets:
         is_skin = sheet.kind == Role.SENSING_SURFACE.value
         material = None if is_skin else design.materials.get(covers[sheet.name] or "")
         metal = material is not None and material.reflection().specularity > 0
-        beside = old.beside.get(sheet.name) if media.bent else None
+        beside = kept.earlier.beside.get(sheet.name) if media.bent else None
         if beside is None or len(beside) != len(sheet.mesh.faces):
-            beside = kept.media_beside(sheet.mesh, solids, metal, old)
+            beside = kept.media_beside(sheet.mesh, solids, metal)
         kept.beside[sheet.name] = beside
         if is_skin:
             before_it = around[beside[0, 0]]
             indices.append(before_it.ior)
             absorptions.append(before_it.absorption)
             surface = coating_surface(design.coating, before_it.ior, Region.SENSING)
-            fine[len(pieces)] = kept.piece(sheet.name, meshes[sheet.name], surface, old)
-            pieces.append(kept.piece(sheet.name, sheet.mesh, surface, old))
+            fine[len(pieces)] = kept.piece(sheet.name, meshes[sheet.name], surface)
+            pieces.append(kept.piece(sheet.name, sheet.mesh, surface))
             continue
-        for (front, back), mesh in kept.split(sheet.mesh, beside, old):
+        for (front, back), mesh in kept.split(sheet.mesh, beside):
             surface = _opaque(material, around[front].ior, around[back].ior)
-            pieces.append(kept.piece(sheet.name, mesh, surface, old))
+            pieces.append(kept.piece(sheet.name, mesh, surface))
     sensing = [meshes[name] for name in design.parts_of(Role.SENSING_SURFACE)]
     emitters = off_faces(_emitters(design, solids), pieces)
     for number, emitter in enumerate(emitters):
         if emitter.shape is not EmitterShape.POINT:
             pieces.append(window(number, emitter))
+    kept.before = None  # so that it can be freed
     return Assembly(
         pieces=pieces,
         sensing=sensing[0] if len(sensing) == 1 else TriangleMesh.joined(sensing),
