@@ -20,10 +20,12 @@ from optisense.optics.radiance_cache.angular_variance import (
     cosine_half_width,
     mean_direction,
     mirrored_above,
+    occluder_horizon,
     reflected_from_discs,
     sample_direction,
     squared_radius,
 )
+from optisense.optics.radiance_cache.beam_sums import MIN_STEP
 from optisense.optics.radiance_cache.cache import BinnedLight
 from optisense.optics.radiance_cache.shading_points import ShadingPoints
 from optisense.optics.scene.coating_bsdf import albedo_of, evaluate_coating, grey
@@ -43,18 +45,10 @@ MIN_SINE = 0.1
 """Lower bound on the sine of elevation (6 degrees) used for the length of the path from a point on
 an indenter to the undeformed surface: light that is lower meets another indenter or a wall first.
 """
-MIN_STEP = 1e-20
-"""Lower bound on the step of the systematic sampling (mW/mm^2/sr): far below any light, it only
-avoids a division by zero where there is none."""
 
 
-@dr.syntax(recursive=True)
 def sum_bins(
-    light: BinnedLight,
-    scenes: ContactScenes,
-    at: ShadingPoints,
-    shadow_rays: mi.Float,
-    horizon: mi.Float,
+    light: BinnedLight, scenes: ContactScenes, at: ShadingPoints, shadow_rays: float
 ) -> list[mi.Color3f]:
     """Return the radiance (3, n) towards the camera due to the direction bins, for each group.
 
@@ -70,8 +64,26 @@ def sum_bins(
     Args:
         scenes: the scenes of the image, with indenters.
         shadow_rays: number of shadow rays of each point and light group.
-        horizon: the occluder horizon (n,) of each point (see `occluder_horizon`).
     """
+    horizon = occluder_horizon(
+        scenes.balls,
+        dr.opaque(mi.UInt32, dr.width(scenes.balls) // 4),
+        at.seen.point,
+        plane_of(light.cells, at.cell, at.active)[0],
+        at.raised & dr.opaque(mi.Bool, scenes.convex),
+    )
+    return _sum_bins(light, scenes, at, dr.opaque(mi.Float, shadow_rays), horizon)
+
+
+@dr.syntax(recursive=True)
+def _sum_bins(
+    light: BinnedLight,
+    scenes: ContactScenes,
+    at: ShadingPoints,
+    shadow_rays: mi.Float,
+    horizon: mi.Float,
+) -> list[mi.Color3f]:
+    """Return the result of `sum_bins` for points with a horizon (n,)."""
     moments, heights, colours = light.tables
     upper, groups, bins, points = light.above, light.groups, light.bins, at.seen
     assert scenes.indenters is not None

@@ -15,7 +15,6 @@ import mitsuba as mi
 
 from optisense.optics.backend.arrays import FEWEST_LANES
 from optisense.optics.backend.sequences import GOLDEN_BITS, STEPS_2D, next_random, unit_float
-from optisense.optics.radiance_cache.angular_variance import occluder_horizon
 from optisense.optics.radiance_cache.bin_sums import sum_bins
 from optisense.optics.radiance_cache.cache import RadianceCache
 from optisense.optics.radiance_cache.shading_points import (
@@ -27,7 +26,6 @@ from optisense.optics.radiance_cache.shading_points import (
 from optisense.optics.scene.coating_bsdf import coating_of, sample_coating
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.ray_scene import Ray, leave
-from optisense.optics.scene.surface_cells import plane_of
 from optisense.optics.transport.camera_paths import VisiblePoints
 
 DIRECTIONS = 4
@@ -196,12 +194,4 @@ def _shading_points(
 
 def _light_of(cache: RadianceCache, scenes: ContactScenes, at: ShadingPoints) -> list[mi.Color3f]:
     """Return, by group, the light (3, n) of the cache that places reflect to their observers."""
-    horizon = occluder_horizon(
-        scenes.balls,
-        dr.opaque(mi.UInt32, dr.width(scenes.balls) // 4),
-        at.seen.point,
-        plane_of(cache.binned.cells, at.cell, at.active)[0],
-        at.raised & dr.opaque(mi.Bool, scenes.convex),
-    )
-    rays = dr.opaque(mi.Float, PLACE_SHADOW_RAYS)
-    return sum_bins(cache.binned, scenes, at, rays, horizon)
+    return sum_bins(cache.binned, scenes, at, PLACE_SHADOW_RAYS)

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 import drjit as dr
 import mitsuba as mi
 
-from optisense.optics.radiance_cache.angular_variance import occluder_horizon
 from optisense.optics.radiance_cache.beam_sums import sum_beams, sum_diffuse, sum_hidden
 from optisense.optics.radiance_cache.beams import Beams
 from optisense.optics.radiance_cache.bin_sums import sum_bins
@@ -29,7 +28,7 @@ from optisense.optics.radiance_cache.shading_points import (
 from optisense.optics.scene.coating_bsdf import coating_of
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.ray_scene import Ray, leave
-from optisense.optics.scene.surface_cells import SurfaceCells, bin_axis, cell_at, plane_of
+from optisense.optics.scene.surface_cells import SurfaceCells, bin_axis, cell_at
 from optisense.optics.scene.surface_table import surface_region
 from optisense.optics.scene.surfaces import Region
 from optisense.optics.transport.camera_paths import VisiblePoints
@@ -86,31 +85,32 @@ def shade_in_contacts(
         The radiance (3, n) due to the light of the cache, and that due to interreflection (None
         without it); for each light group, with lights of 1 mW.
     """
-    table = scenes.full.table
-    region = surface_region(table, points.surface, points.valid)
+    region = surface_region(scenes.full.table, points.surface, points.valid)
     raised = points.valid & (region >= int(Region.INDENTER))
-    cells = cache.binned.cells
-    base = _place_below(cells, scenes, points, raised)
-    cell, shift, active = interpolating_cell(
-        cells, base, points.valid, points.series, points.number
-    )
-    start = leave(points.point, points.face_normal, points.face_normal)
-    coating = coating_of(table, points.surface, active, cache.metallic)
-    coating.only_tail = cache.traced_lobes
-    at = ShadingPoints(points, coating, start, cell, shift, active, raised)
-    horizon = occluder_horizon(
-        scenes.balls,
-        dr.opaque(mi.UInt32, dr.width(scenes.balls) // 4),
-        points.point,
-        plane_of(cells, cell, active)[0],
-        raised & dr.opaque(mi.Bool, scenes.convex),
-    )
-    shadow_rays = dr.opaque(mi.Float, effort.contact_shadow_rays)
-    far = sum_bins(cache.binned, scenes, at, shadow_rays, horizon)
+    base = _place_below(cache.binned.cells, scenes, points, raised)
+    at = _shading_points(cache, scenes, points, base, raised)
+    far = sum_bins(cache.binned, scenes, at, effort.contact_shadow_rays)
     if not interreflection:
         return far, None
     between = glossy_interreflection if cache.metallic else interreflected
     return far, between(cache, scenes, at)
+
+
+def _shading_points(
+    cache: RadianceCache,
+    scenes: ContactScenes,
+    points: VisiblePoints,
+    base: mi.Point3f,
+    raised: mi.Bool,
+) -> ShadingPoints:
+    """Return the shading points of visible points, which read the cache about ``base``."""
+    cell, shift, active = interpolating_cell(
+        cache.binned.cells, base, points.valid, points.series, points.number
+    )
+    coating = coating_of(scenes.full.table, points.surface, active, cache.metallic)
+    coating.only_tail = cache.traced_lobes
+    start = leave(points.point, points.face_normal, points.face_normal)
+    return ShadingPoints(points, coating, start, cell, shift, active, raised)
 
 
 def _place_below(
@@ -149,13 +149,7 @@ def shade(
         reflected: whether the points are seen in the reflection of an interface.
     """
     base, seen = points.point, points.valid
-    cell, shift, active = interpolating_cell(
-        cache.binned.cells, base, seen, points.series, points.number
-    )
-    start = leave(base, points.face_normal, points.face_normal)
-    coating = coating_of(scenes.full.table, points.surface, active, cache.metallic)
-    coating.only_tail = cache.traced_lobes
-    at = ShadingPoints(points, coating, start, cell, shift, active, mi.Bool(False))
+    at = _shading_points(cache, scenes, points, base, mi.Bool(False))
     indenters = scenes.indenters
     axis = bin_axis(cache.binned.cells, 2)
     totals: list[mi.Color3f]
@@ -194,13 +188,7 @@ def beside_contacts(
     Returns:
         The radiance (3, n) towards the camera, for each light group.
     """
-    table = scenes.full.table
-    cell, shift, active = interpolating_cell(
-        cache.binned.cells, points.point, points.valid, points.series, points.number
-    )
-    coating = coating_of(table, points.surface, active, cache.metallic)
-    start = leave(points.point, points.face_normal, points.face_normal)
-    at = ShadingPoints(points, coating, start, cell, shift, active, mi.Bool(False))
+    at = _shading_points(cache, scenes, points, points.point, mi.Bool(False))
     if cache.metallic:
         at.raised = dr.full(mi.Bool, False, dr.width(points.pixel))
         return glossy_interreflection(cache, scenes, at)
