@@ -156,6 +156,11 @@ def sensor_body(
         notes.append(
             f"{each.name} has neither mass nor contacts, as other parts fill all of its space"
         )
+    notes += [
+        f"{each.name} has neither mass nor contacts, as it is a sheet without a thickness"
+        for each in made
+        if not each.is_solid and each.role is not Role.SENSING_SURFACE
+    ]
     if not solids:
         raise DesignError("parts of air fill the space of all solids", where=design.where("parts"))
     masses = [given.get(each.name, density_of(each)) * KILOGRAMS for each in solids]

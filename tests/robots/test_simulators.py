@@ -172,11 +172,14 @@ def test_a_solid_inside_another_one_is_left_out(off: float, turn: float) -> None
 
 
 def test_mujoco_reads_a_sheet_of_one_triangle_and_a_design_named_world(tmp_path: Path) -> None:
-    """Its meshes have four vertices or more, and `world` is its own body."""
+    """Its meshes have four vertices or more, `world` is its own body; a note names the sheet."""
     design = sensors.build("gelsight-mini-ideal").model_copy(update={"name": "world"})
     design.parts["flap"] = Part(role=Role.BLOCKER, mesh="meshes/flap.obj")
     design.meshes["flap"] = TriangleMesh(np.eye(3) - [0.0, 0.0, 50.0], np.array([[0, 1, 2]]))
-    mjcf, *_ = export_robot(design, tmp_path)
+    notes: list[str] = []
+    mjcf, *_ = export_robot(design, tmp_path, notes=notes)
+    assert "flap has neither mass nor contacts, as it is a sheet without a thickness" in notes
+    assert not any(note.startswith("skin has") for note in notes)
     model = mujoco.MjModel.from_xml_path(str(mjcf))
     assert model.body(1).name == mjcf.stem == "world-sensor"
 
