@@ -265,9 +265,9 @@ def linear(depth: float) -> Press:
     x = (np.arange(LINE_POINTS) - (LINE_POINTS - 1) / 2) * pitch
     square = np.minimum(x[:, None] ** 2 + x**2, RADIUS**2)
     response = GridResponse((LINE_POINTS, LINE_POINTS), pitch, THICKNESS, GEL)
-    solved = solve_normal_contact(response, depth - RADIUS + np.sqrt(RADIUS**2 - square))
-    area = contact_area(solved.pressure, pitch)
-    return Press(float(solved.pressure.sum()) * pitch**2, math.sqrt(area / math.pi))
+    pressure = solve_normal_contact(response, depth - RADIUS + np.sqrt(RADIUS**2 - square))
+    area = contact_area(pressure, pitch)
+    return Press(float(pressure.sum()) * pitch**2, math.sqrt(area / math.pi))
 
 
 def main() -> None:

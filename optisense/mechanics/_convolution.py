@@ -14,7 +14,6 @@ from optisense.mechanics._elasticity import Elasticity
 from optisense.mechanics._layer import LoadKernels, SquareLoad
 
 ODD = {
-    "zz": (False, False),
     "xz": (True, False),
     "yz": (False, True),
     "xx": (False, False),
@@ -92,35 +91,18 @@ class GridResponse:
         """
         return self._restored(self._pressure_kernel * self._transformed(pressure))
 
-    def displacement(self, pressure: FloatArray, shear: FloatArray | None = None) -> FloatArray:
-        """Return the displacement (3, rows, columns), mm, along x, y and into the layer.
-
-        Args:
-            pressure: (rows, columns) pressure, MPa.
-            shear: (2, rows, columns) shear along x and y, MPa; None for none.
+    def tangential(self, shear: FloatArray, pressure: FloatArray | None = None) -> FloatArray:
+        """Return the displacement (2, rows, columns), mm, along the surface by a shear (2, rows,
+        columns) and a pressure (rows, columns), MPa, if there is one.
         """
-        p = self._transformed(pressure)
-        kernels = self._kernels
-        x, y, z = kernels.xz * p, kernels.yz * p, kernels.zz * p
-        if shear is not None:
-            along_x, along_y = self._transformed(shear[0]), self._transformed(shear[1])
-            x += kernels.xx * along_x + kernels.xy * along_y
-            y += kernels.xy * along_x + kernels.yy * along_y
-            # By Betti's theorem, the normal displacement due to shear is the mirrored tangential
-            # displacement due to pressure.
-            z -= kernels.xz * along_x + kernels.yz * along_y
-        return np.stack([self._restored(each) for each in (x, y, z)])
-
-    def tangential(self, shear: FloatArray) -> FloatArray:
-        """Return the displacement (2, rows, columns), mm, by a shear (2, rows, columns), MPa."""
         kernels = self._kernels
         along_x, along_y = self._transformed(shear[0]), self._transformed(shear[1])
-        return np.stack(
-            [
-                self._restored(kernels.xx * along_x + kernels.xy * along_y),
-                self._restored(kernels.xy * along_x + kernels.yy * along_y),
-            ]
-        )
+        x = kernels.xx * along_x + kernels.xy * along_y
+        y = kernels.xy * along_x + kernels.yy * along_y
+        if pressure is not None:
+            p = self._transformed(pressure)
+            x, y = x + kernels.xz * p, y + kernels.yz * p
+        return np.stack([self._restored(x), self._restored(y)])
 
     def largest_tangential(self) -> float:
         """Return the largest ratio (mm/MPa) of the RMS displacement along the surface to the RMS of

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import (
-    binary_erosion,
-    distance_transform_edt,
-    map_coordinates,
-    maximum_filter,
-)
+from scipy.ndimage import binary_erosion, distance_transform_edt, map_coordinates, maximum_filter
 
 from optisense.array_types import FloatArray
 from optisense.mechanics._convolution import GridResponse
@@ -23,6 +19,9 @@ from optisense.mechanics._height_map import slopes
 
 if TYPE_CHECKING:
     from optisense.mechanics._gel_patch import GelPatch
+
+Read = Callable[[FloatArray, FloatArray], FloatArray]
+"""Function that returns values (..., n) of a grid at points (n,), mm."""
 
 RING = 1.0
 """Width of the fine grid around a footprint, over the footprint's shorter side or, if that is less,
@@ -66,8 +65,8 @@ class DisplacementField:
 
     Attributes:
         place: the grid of the pressure.
-        shear: (2, rows, columns) shear (MPa) of a dragged indenter; it must be set before
-            `tangential` is called.
+        shear: (2, rows, columns) shear (MPa) of a dragged indenter, 0 at first; it must be set
+            before `tangential` is called.
     """
 
     def __init__(
@@ -99,7 +98,6 @@ class DisplacementField:
         farthest = rows + ring - 1, columns + ring - 1
         response = grid_response(shape, pitch, thickness, elasticity, farthest)
         x0, y0 = place.x[0] - ring * pitch, place.y[0] - ring * pitch
-        self._around = GridArea(shape, x0, y0, pitch)
         self._touching, self._pressure = pressure > 0.0, pressure
         step = thickness / COARSE_POINTS
         reach = DECAY * thickness
@@ -113,29 +111,23 @@ class DisplacementField:
         wide = grid_response((counts[1], counts[0]), step, thickness, elasticity, farthest)
         # What follows from these is computed when it is asked for: other contacts need the coarse
         # grid only, and few calls need displacements along the skin.
-        self.shear: FloatArray | None = None
+        self.shear: FloatArray = np.zeros((2, rows, columns))
         self._ring = ring
         self._loads = (
             (response, np.pad(pressure, ring), (x0, y0, pitch)),
             (wide, coarse, (ends[0][0], ends[1][0], step)),
         )
+        self._areas = [GridArea(response.shape, *start) for response, _, start in self._loads]
 
     def at(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the displacement (n,), mm, into the gel at points of the tangent plane, and its
-        slopes (n,) by x and (n,) by y.
+        """Return the displacement (n,), mm, into the gel at points (n,), mm, of the tangent plane,
+        and its slopes (n,) by x and (n,) by y.
 
         The slope jumps at the edge of a contact; inside, it equals that of the indenter.
-
-        Args:
-            x, y: (n,) coordinates of the points, mm.
         """
-        result = np.zeros((3, len(x)))
-        near = self._around.holds(x, y)
-        reached = ~near & self._coarse.holds(x, y)
-        if near.any():
-            result[:, near] = self._fine.at(x[near], y[near])
-        if reached.any():
-            result[:, reached] = self._coarse.at_linear(x[reached], y[reached])
+        result = self._read(
+            x, y, lambda *at: self._fine.at(*at), lambda *at: self._coarse.at_linear(*at), 3
+        )
         inside = self.touching(x, y)
         if inside.any():
             column, row = (
@@ -151,13 +143,9 @@ class DisplacementField:
 
     def depth(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """Return the displacement (n,), mm, of points of the tangent plane into the gel."""
-        result = np.zeros(len(x))
-        near = self._around.holds(x, y)
-        reached = ~near & self._coarse.holds(x, y)
-        if near.any():
-            result[near] = self._fine.value(x[near], y[near])
-        if reached.any():
-            result[reached] = self._coarse.value(x[reached], y[reached])
+        (result,) = self._read(
+            x, y, lambda *at: self._fine.value(*at), lambda *at: self._coarse.value(*at)
+        )
         if self._beyond is not None:
             known = self._beyond.holds(x, y)
             result[known] += self._beyond.value(x[known], y[known])
@@ -171,22 +159,47 @@ class DisplacementField:
         """Return the displacement (3, n), mm, along x and y of points of the tangent plane by a
         shear (2, rows, columns), MPa, alone.
         """
-        splines = [
-            (GridSpline(along_x, *start), GridSpline(along_y, *start))
-            for (response, _, start), each in zip(self._loads, self._on_grids(shear), strict=True)
-            for along_x, along_y in [response.tangential(each)]
-        ]
-        beyond = None
-        if self._patch is not None:
-            loads = np.concatenate([shear, np.zeros((1, *self._pressure.shape))])
-            beyond = tangential_beyond(self._patch, loads, self.place, self._shear_modulus)
-        found = _along(splines, beyond, x, y)
-        return np.concatenate([found, np.zeros((1, len(x)))])
+        splines = self._splines_along(shear, with_pressure=False)
+        beyond = self._tangential_beyond(shear, np.zeros_like(self._pressure))
+        return np.concatenate([self._along(splines, beyond, x, y), np.zeros((1, len(x)))])
 
     def tangential(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """Return the displacement (2, n), mm, of points of the tangent plane along x and y."""
-        beyond = None if self._patch is None else self._tangential_beyond
-        return _along(self._tangential_splines, beyond, x, y)
+        return self._along(*self._tangential_splines, x, y)
+
+    def _along(
+        self,
+        splines_of_grids: list[tuple[GridSpline, GridSpline]],
+        beyond: tuple[GridSpline, GridSpline] | None,
+        x: FloatArray,
+        y: FloatArray,
+    ) -> FloatArray:
+        """Return the displacement (2, n), mm, along x and y at points of the tangent plane.
+
+        Args:
+            splines_of_grids: its splines along x and y on the fine and on the coarse grid.
+            beyond: splines of the contribution of the gel's shape, if it has one.
+        """
+        result = np.concatenate(
+            [self._read(x, y, *(both[k].value for both in splines_of_grids)) for k in (0, 1)]
+        )
+        if beyond is not None:
+            known = beyond[0].holds(x, y)
+            result[:, known] += [spline.value(x[known], y[known]) for spline in beyond]
+        return result
+
+    def _read(
+        self, x: FloatArray, y: FloatArray, fine: Read, coarse: Read, rows: int = 1
+    ) -> FloatArray:
+        """Return values (rows, n) at points (n,), mm: those of the fine grid where it reaches, and
+        those of the coarse one, or 0, farther out.
+        """
+        result = np.zeros((rows, len(x)))
+        near, reached = (area.holds(x, y) for area in self._areas)
+        for where, read in ((near, fine), (reached & ~near, coarse)):
+            if where.any():
+                result[:, where] = read(x[where], y[where])
+        return result
 
     @cached_property
     def _fine(self) -> LimitedSpline:
@@ -202,28 +215,36 @@ class DisplacementField:
         return GridSpline(wide.normal(coarse), *start)
 
     @cached_property
-    def _tangential_beyond(self) -> tuple[GridSpline, GridSpline]:
-        """Return the contribution of the gel's shape to displacements along x and y."""
-        assert self._patch is not None
-        shear = np.zeros((2, *self._pressure.shape)) if self.shear is None else self.shear
-        loads = np.concatenate([shear, self._pressure[None]])
+    def _tangential_splines(
+        self,
+    ) -> tuple[list[tuple[GridSpline, GridSpline]], tuple[GridSpline, GridSpline] | None]:
+        splines = self._splines_along(self.shear, with_pressure=True)
+        return splines, self._tangential_beyond(self.shear, self._pressure)
+
+    def _tangential_beyond(
+        self, shear: FloatArray, pressure: FloatArray
+    ) -> tuple[GridSpline, GridSpline] | None:
+        """Return the contribution of the gel's shape to displacements along x and y, if any."""
+        if self._patch is None:
+            return None
+        loads = np.concatenate([shear, pressure[None]])
         return tangential_beyond(self._patch, loads, self.place, self._shear_modulus)
 
-    @cached_property
-    def _tangential_splines(self) -> list[tuple[GridSpline, GridSpline]]:
-        shears = [None, None] if self.shear is None else self._on_grids(self.shear)
-        found = []
-        for (response, pressure, start), shear in zip(self._loads, shears, strict=True):
-            along_x, along_y, _ = response.displacement(pressure, shear)
-            found.append((GridSpline(along_x, *start), GridSpline(along_y, *start)))
-        return found
-
-    def _on_grids(self, shear: FloatArray) -> list[FloatArray]:
-        """Return a shear (2, rows, columns) on the fine and the coarse grid."""
+    def _splines_along(
+        self, shear: FloatArray, with_pressure: bool
+    ) -> list[tuple[GridSpline, GridSpline]]:
+        """Return splines of the displacement along x and y on the fine and the coarse grid."""
         _, (wide, _, start) = self._loads
-        coarse = [binned(each, self.place, start[:2], start[2], wide.shape) for each in shear]
         ring = self._ring
-        return [np.pad(shear, ((0, 0), (ring, ring), (ring, ring))), np.stack(coarse)]
+        shears = (
+            np.pad(shear, ((0, 0), (ring, ring), (ring, ring))),
+            np.stack([binned(a, self.place, start[:2], start[2], wide.shape) for a in shear]),
+        )
+        found = []
+        for (response, pressure, at), each in zip(self._loads, shears, strict=True):
+            along_x, along_y = response.tangential(each, pressure if with_pressure else None)
+            found.append((GridSpline(along_x, *at), GridSpline(along_y, *at)))
+        return found
 
     def pressure(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """Return the pressure (n,), MPa, at points of the tangent plane."""
@@ -329,30 +350,3 @@ def tangential_beyond(
     coarse = np.stack([binned(a, place, start, pitch, patch.shape) for a in loads])
     along_x, along_y = patch.tangential(coarse * pitch**2 / shear_modulus)
     return GridSpline(along_x, *start, pitch), GridSpline(along_y, *start, pitch)
-
-
-def _along(
-    splines_of_grids: list[tuple[GridSpline, GridSpline]],
-    beyond: tuple[GridSpline, GridSpline] | None,
-    x: FloatArray,
-    y: FloatArray,
-) -> FloatArray:
-    """Return the displacement (2, n), mm, along x and y at points of the tangent plane.
-
-    Args:
-        splines_of_grids: its splines on the fine and on the coarse grid.
-        beyond: splines of the contribution of the gel's shape, if it has one.
-    """
-    result = np.zeros((2, len(x)))
-    (near, near_y), (far, far_y) = splines_of_grids
-    close = near.holds(x, y)
-    reached = ~close & far.holds(x, y)
-    for where, splines in ((close, (near, near_y)), (reached, (far, far_y))):
-        if where.any():
-            for k, spline in enumerate(splines):
-                result[k, where] = spline.value(x[where], y[where])
-    if beyond is not None:
-        known = beyond[0].holds(x, y)
-        for k, spline in enumerate(beyond):
-            result[k, known] += spline.value(x[known], y[known])
-    return result

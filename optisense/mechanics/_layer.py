@@ -179,17 +179,14 @@ def surface_displacement(x: FloatArray, y: FloatArray, poisson_ratio: float) -> 
 
 
 class LoadKernels(NamedTuple):
-    """Displacements (mm) at points by unit loads (1 MPa) on a square around the origin.
-
-    The normal displacement and the normal load point into the layer; x and y lie in its surface.
+    """Displacements (mm) along the surface, at points, by unit loads (1 MPa) on a square around the
+    origin.
 
     Attributes:
-        zz: normal displacement by pressure.
         xz, yz: displacement along x and y by pressure.
         xx, yy, xy: displacement along x by shear along x, y by y, and x by y (as y by x).
     """
 
-    zz: FloatArray
     xz: FloatArray
     yz: FloatArray
     xx: FloatArray
@@ -224,7 +221,7 @@ class SquareLoad:
         return self._total(half_space + self._corrected("normal", x, y), x, y)
 
     def kernels(self, x: FloatArray, y: FloatArray) -> LoadKernels:
-        """Return all displacements, (...) each, mm, of points (...), mm, by loads of 1 MPa."""
+        """Return the displacements along the surface, (...) each, mm, of points (...), mm."""
         nu, inverse = self.poisson_ratio, 1.0 / (2.0 * np.pi)
         x_part, y_part = self._sum(_x_squared, x, y), self._sum(_y_squared, x, y)
         r = np.hypot(x, y)
@@ -244,7 +241,7 @@ class SquareLoad:
             inverse * (y_part + (1.0 - nu) * x_part) + isotropic - quadrupole * twice,
             inverse * nu * self._sum(_mixed, x, y) + quadrupole * 2.0 * cosine * sine,
         )
-        return LoadKernels(self.pressed_in(x, y), *(self._total(each, x, y) for each in sideways))
+        return LoadKernels(*(self._total(each, x, y) for each in sideways))
 
     def _sum(
         self, term: Callable[[FloatArray, FloatArray], FloatArray], x: FloatArray, y: FloatArray

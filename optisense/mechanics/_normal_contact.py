@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from optisense.array_types import FloatArray
@@ -17,25 +15,13 @@ MAX_ITERATIONS = 400
 """Number of iterations after which the solver fails; smooth contacts take 30, rough ones 100."""
 
 
-class NormalContact(NamedTuple):
-    """A solved contact.
-
-    Attributes:
-        pressure: (rows, columns) pressure (MPa), 0 outside the contact.
-        displacement: (rows, columns) displacement into the layer, mm.
-    """
-
-    pressure: FloatArray
-    displacement: FloatArray
-
-
 def solve_normal_contact(
     response: GridResponse,
     overlap: FloatArray,
     start: FloatArray | None = None,
     tolerance: float = TOLERANCE,
-) -> NormalContact:
-    """Solve for the pressure that keeps the skin from penetrating an indenter.
+) -> FloatArray:
+    """Return the pressure (rows, columns), MPa, that keeps the skin from penetrating an indenter.
 
     The pressure is nowhere negative, the displacement equals the overlap where there is pressure,
     and is at least the overlap elsewhere. It minimises the complementary energy; the method is the
@@ -53,8 +39,7 @@ def solve_normal_contact(
     """
     deepest = float(overlap.max())
     if deepest <= 0.0:
-        nothing = np.zeros_like(overlap)
-        return NormalContact(nothing, nothing)
+        return np.zeros_like(overlap)
     pressure = np.zeros_like(overlap) if start is None else start.copy()
     displacement = response.normal(pressure) if start is not None else pressure
     way = np.zeros_like(overlap)
@@ -72,7 +57,7 @@ def solve_normal_contact(
             and np.abs(residual).max() <= tolerance * deepest
             and gap.min() >= -tolerance * deepest
         ):
-            return NormalContact(pressure, displacement)
+            return pressure
         way = np.where(touching, residual + (square / before if goes_on else 0.0) * way, 0.0)
         before = square
         yielded = response.normal(way)

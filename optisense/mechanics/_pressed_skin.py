@@ -11,10 +11,7 @@ from numpy.typing import NDArray
 
 from optisense.array_types import FloatArray
 from optisense.errors import ContactError
-from optisense.mechanics._displacement_field import (
-    DisplacementField,
-    grid_response,
-)
+from optisense.mechanics._displacement_field import DisplacementField, grid_response
 from optisense.mechanics._elasticity import Elasticity
 from optisense.mechanics._footprint import Footprint
 from optisense.mechanics._gel_patch import GelPatch
@@ -22,7 +19,6 @@ from optisense.mechanics._grid_spline import GridSpline, binned
 from optisense.mechanics._neighbours import OUTWARD, Neighbours
 from optisense.mechanics._normal_contact import (
     TOLERANCE,
-    NormalContact,
     contact_area,
     solve_normal_contact,
 )
@@ -296,9 +292,8 @@ def _pressed(
     """Solve one contact; pressure and the correction for the gel's shape are iterated in turn."""
     pressure = None if before is None else before.pressure
     if patch is None:
-        solved = _solve(place, overlap, elasticity, pressure, tolerance)
-        field = DisplacementField(place, overlap, solved.pressure, elasticity)
-        return Pressed(place, solved.pressure, field)
+        pressure = _solve(place, overlap, elasticity, pressure, tolerance)
+        return Pressed(place, pressure, DisplacementField(place, overlap, pressure, elasticity))
     x, y = (each.ravel() for each in np.meshgrid(place.x, place.y))
     pitch = patch.columns.pitch
     start = patch.x[0], patch.y[0]
@@ -308,26 +303,26 @@ def _pressed(
     known = None if before is None else before.beyond
     values = np.zeros(patch.shape) if known is None else known
     beyond = GridSpline(values, *start, pitch).value(x, y).reshape(overlap.shape)
-    solved = _solve(place, overlap - beyond, elasticity, pressure, FIRST_TOLERANCE)
+    pressure = _solve(place, overlap - beyond, elasticity, pressure, FIRST_TOLERANCE)
     relaxation = Relaxation(values)
     change = np.inf
     for _ in range(MAX_TURNS):
         last = change
-        coarse = binned(solved.pressure, place, start, pitch, patch.shape)
+        coarse = binned(pressure, place, start, pitch, patch.shape)
         found = patch.correction(coarse * pitch**2 / elasticity.shear_modulus)
         change = float(np.abs(found - values)[near].max())
         values = relaxation.next(found)
         spline = GridSpline(values, *start, pitch)
         beyond = spline.value(x, y).reshape(overlap.shape)
         rough = max(tolerance, _tolerance(change, overlap))
-        solved = _solve(place, overlap - beyond, elasticity, solved.pressure, rough)
+        pressure = _solve(place, overlap - beyond, elasticity, pressure, rough)
         stalled = last <= change < UNSETTLED
         if change < SETTLED or stalled:
             break
     else:
         refuse_unsettled("the pressure under an indenter", MAX_TURNS, change)
-    field = DisplacementField(place, overlap - beyond, solved.pressure, elasticity, spline, patch)
-    return Pressed(place, solved.pressure, field, beyond=values)
+    field = DisplacementField(place, overlap - beyond, pressure, elasticity, spline, patch)
+    return Pressed(place, pressure, field, beyond=values)
 
 
 def _tolerance(change: float, overlap: FloatArray) -> float:
@@ -342,6 +337,6 @@ def _solve(
     elasticity: Elasticity,
     start: FloatArray | None,
     tolerance: float,
-) -> NormalContact:
+) -> FloatArray:
     response = grid_response(overlap.shape, place.pitch, place.thickness, elasticity)
     return solve_normal_contact(response, overlap, start, tolerance)

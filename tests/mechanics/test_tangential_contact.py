@@ -37,8 +37,8 @@ def hertz():
     pitch = width / count
     x = (np.arange(count) - (count - 1) / 2) * pitch
     response = GridResponse((count, count), pitch, 400.0, GEL)
-    solved = solve_normal_contact(response, depth - (x[:, None] ** 2 + x**2) / (2 * radius))
-    return response, solved.pressure, x, pitch, math.sqrt(radius * depth)
+    pressure = solve_normal_contact(response, depth - (x[:, None] ** 2 + x**2) / (2 * radius))
+    return response, pressure, x, pitch, math.sqrt(radius * depth)
 
 
 @pytest.mark.parametrize("share", [0.2, 0.6, 0.9])
