@@ -15,7 +15,7 @@ from optisense.geometry import TriangleMesh
 from optisense.geometry.patches import sides_of_faces
 from optisense.geometry.rays import exits
 from optisense.mechanics._footprint import Footprint, outer_faces
-from optisense.mechanics._height_map import heights
+from optisense.mechanics._height_map import heights, slopes
 
 PITCH = 1.0 / 3.0
 """Distance of columns under a contact over the thickness of the gel. The effect of the gel's shape
@@ -47,14 +47,10 @@ tenth, forces change by 1 % from one case to the other."""
 LEAST_UPRIGHT = 0.5
 """Cosine of the steepest slope of the skin against the tangent plane that is modelled, 60 degrees;
 beyond it a dome's skin is too steep for columns over the tangent plane."""
-TILE = 2.0
-"""Side of the cubes whose columns are traced together, over the longest column. It bounds the
-number of faces that are tested: those within three lengths of a column."""
 LEAST_LEAVING = -0.5
-"""Smallest cosine between the normal of a face and the mean direction of the lines of a tile at
-which the face is tested. Lines leave the base of a gel nearly at right angles, and single lines of
-a tile differ from their mean by up to 60 degrees; the skin itself, which is left out, faces
-them."""
+"""Smallest cosine between the normal of a face and the mean direction of the columns at which the
+face is tested. Lines leave the base of a gel nearly at right angles, and single lines differ from
+their mean by up to 60 degrees; the skin itself, which is left out, faces them."""
 ASIDE = 1e-6
 """Distance by which the lines of columns at the border of the gel start inside of it, over the
 thickness: far above the rounding of double precision, which puts lines in the plane of a side on
@@ -112,11 +108,8 @@ def gel_columns(
     skin: TriangleMesh,
     elastomers: Sequence[TriangleMesh],
 ) -> GelColumns | None:
-    """Return the columns around a contact; None if there are too few for a body.
-
-    Args:
-        loaded: half sides (mm) of the rectangle around the contact that carries loads.
-        skin: the undeformed sensing surface, in the design's frame.
+    """Return the columns around a contact, of which a rectangle with half sides ``loaded`` (mm)
+    carries loads; None if there are too few for a body.
     """
     thickness = place.thickness
     halves = [half + REACH * thickness for half in loaded]
@@ -175,9 +168,7 @@ def gel_columns(
 def _graded(near: float, outer: float) -> IntArray:
     """Return the places of columns along an axis, in steps of the fine grid from the middle.
 
-    Args:
-        near: distance from the middle, in pitches, up to which columns are one pitch apart.
-        outer: distance of the outermost column, in pitches.
+    Up to a distance ``near`` columns are one pitch apart; the last one is at ``outer`` (pitches).
     """
     inside = min(math.ceil(near), round(outer))
     left = round(outer) - inside
@@ -194,9 +185,7 @@ def _walls(fine: FloatArray, step: float) -> BoolArray:
     """Return a mask (rows, columns) of the points of a fine grid on steep skin that ends within a
     pitch, as at the side of a tray; the gel ends where such skin begins.
 
-    Args:
-        fine: heights (mm), minus infinity where there is no skin.
-        step: distance (mm) of the points.
+    Heights (mm) are minus infinity without skin, and ``step`` (mm) is the distance of the points.
     """
     found = np.zeros(fine.shape, dtype=bool)
     known = np.isfinite(fine)
@@ -238,11 +227,8 @@ def _border(skin: TriangleMesh, place: Footprint) -> FloatArray:
 
 
 def _crossings(edges: FloatArray, axis: int, line: float) -> FloatArray:
-    """Return the points (n, 3) at which edges (m, 2, 3) meet the plane of a line along an axis.
-
-    Args:
-        axis: 0 for a line along x, 1 for one along y.
-        line: y of the line along x, or x of the line along y, mm.
+    """Return the points (n, 3) at which edges (m, 2, 3) meet the plane of a line along x or y (0 or
+    1), whose other coordinate is ``line`` (mm).
     """
     side = edges[:, :, 1 - axis] - line
     some = (side[:, 0] < 0.0) != (side[:, 1] < 0.0)
@@ -325,25 +311,10 @@ def _away_from_the_border(there: BoolArray) -> FloatArray:
 
 
 def _inward(fine: FloatArray, at_x: IntArray, at_y: IntArray, pitch: float) -> FloatArray:
-    """Return the unit normals (rows, columns, 3) into the gel, from differences over a pitch to
-    either side, or to one side at borders.
-
-    Args:
-        fine: heights on the fine grid, mm; NaN where there is no skin.
-        at_x, at_y: its columns and rows at which there are columns of gel.
-        pitch: distance between columns under the contact, mm.
+    """Return the unit normals (rows, columns, 3) into the gel at some columns and rows of the fine
+    grid, from differences of its heights (mm; NaN without skin) over a pitch (mm).
     """
-    wide = np.pad(fine, FINER, constant_values=np.nan)
-    found = []
-    for by_row, by_column in ((0, 1), (1, 0)):
-        heights_there = [
-            wide[np.ix_(at_y + FINER + by_row * shift, at_x + FINER + by_column * shift)]
-            for shift in (-FINER, 0, FINER)
-        ]
-        rise = np.diff(heights_there, axis=0)
-        known = np.isfinite(rise).sum(axis=0)
-        total = np.nan_to_num(rise).sum(axis=0)
-        found.append(np.where(known > 0, total / np.maximum(known, 1), np.nan) / pitch)
+    found = [slope[np.ix_(at_y, at_x)] for slope in slopes(fine, pitch, FINER)]
     normals = np.stack([*found, -np.ones_like(found[0])], axis=2)
     return np.asarray(normals / np.linalg.norm(normals, axis=2, keepdims=True))
 
@@ -357,27 +328,19 @@ def _lengths(
     result = np.full(len(starts), np.inf)
     if not len(starts):
         return result
-    tiles = np.floor(starts / (TILE * longest)).astype(np.int64)
-    _, tile = np.unique(tiles, axis=0, return_inverse=True)
-    order = np.argsort(tile.ravel(), kind="stable")
-    groups = np.split(order, np.flatnonzero(np.diff(tile.ravel()[order])) + 1)
-    for group in groups:
-        way = ways[group]
-        ends = np.concatenate([starts[group], starts[group] + longest * way])
-        low, high = ends.min(axis=0), ends.max(axis=0)
-        parts = []
-        for body in bodies:
-            lowest, highest = body.face_bounds
-            near = ((highest >= low) & (lowest <= high)).all(axis=1)
-            if len(bodies) == 1:
-                # Lines leave through faces that point the same way; they meet the skin from behind.
-                near &= body.face_normals @ way.mean(axis=0) > LEAST_LEAVING
-            if near.any():
-                parts.append(TriangleMesh(body.vertices, body.faces[near]))
-        if parts:
-            found = exits(parts, starts[group], way)
-            result[group] = np.where(found <= longest, found, np.inf)
-    return result
+    ends = np.concatenate([starts, starts + longest * ways])
+    low, high = ends.min(axis=0), ends.max(axis=0)
+    parts = []
+    for body in bodies:
+        lowest, highest = body.face_bounds
+        near = ((highest >= low) & (lowest <= high)).all(axis=1)
+        if len(bodies) == 1:
+            # Lines leave through faces that point the same way; they meet the skin from behind.
+            near &= body.face_normals @ ways.mean(axis=0) > LEAST_LEAVING
+        if near.any():
+            parts.append(body.with_faces(body.faces[near]))
+    found = exits(parts, starts, ways) if parts else result
+    return np.where(found <= longest, found, np.inf)
 
 
 def _folded(top: FloatArray, inward: FloatArray, length: FloatArray) -> BoolArray:

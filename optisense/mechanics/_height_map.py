@@ -77,16 +77,10 @@ def _points_on(
     x: FloatArray,
     y: FloatArray,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Return pairs of a triangle and a grid point on it, or slightly beside it.
+    """Return the triangle, the row and the column of all pairs of one of ``some`` triangles and a
+    grid point on it, or slightly beside it.
 
-    Args:
-        corners: (faces, 3, 3) corners of all triangles, mm.
-        some: (n,) numbers of the triangles.
-        first_row, last_row: (faces,) rows of the grid between which each triangle lies.
-        x, y: grid coordinates, mm.
-
-    Returns:
-        The triangle, the row and the column of each pair.
+    Each triangle with corners (faces, 3, 3) lies between two rows (faces,) of the grid.
     """
     face, number = _counted(some, last_row[some] - first_row[some] + 1)
     row = first_row[face] + number
@@ -116,28 +110,26 @@ def _counted(
     return np.repeat(values, counts), np.arange(int(counts.sum())) - np.repeat(starts, counts)
 
 
-def slopes(height: FloatArray, pitch: float) -> tuple[FloatArray, FloatArray]:
-    """Return the slopes of heights by x and by y, from the neighbours that have a height.
+def slopes(height: FloatArray, pitch: float, apart: int = 1) -> tuple[FloatArray, FloatArray]:
+    """Return the slopes of heights by x and by y, from the points on both sides with a height.
 
     Args:
         height: (rows, columns) heights, mm; NaN where there is none.
-        pitch: distance between points, mm.
+        pitch: distance (mm) of these points, which are ``apart`` steps of the grid.
 
     Returns:
-        The slopes, (rows, columns) each: the mean of the slopes to both neighbours, the slope to
-        the only one, or NaN where there is none.
+        The slopes, (rows, columns) each: the mean of the slopes to both sides, the slope to the
+        only one with a height, or NaN where there is none.
     """
     found = []
-    for axis in (1, 0):
-        step = np.diff(height, axis=axis)
-        around = [(1, 0) if k == axis else (0, 0) for k in range(2)]
-        behind = np.pad(step, around, constant_values=np.nan)
-        around = [(0, 1) if k == axis else (0, 0) for k in range(2)]
-        ahead = np.pad(step, around, constant_values=np.nan)
-        known = np.isfinite(behind).astype(np.int64) + np.isfinite(ahead)
-        total = np.nan_to_num(behind) + np.nan_to_num(ahead)
+    for along in (height.T, height):
+        step = along[apart:] - along[:-apart]
+        both = [np.pad(step, (ends, (0, 0)), constant_values=np.nan)
+                for ends in ((apart, 0), (0, apart))]  # fmt: skip
+        known = np.isfinite(both).sum(axis=0)
+        total = np.nan_to_num(both).sum(axis=0)
         found.append(np.where(known > 0, total / np.maximum(known, 1), np.nan) / pitch)
-    return found[0], found[1]
+    return found[0].T, found[1]
 
 
 def _on_triangles(
