@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,21 +42,6 @@ MAX_COARSE = 400
 """Largest number of points of the coarse grid along a side, which bounds its transform's time."""
 
 
-class Nearby(NamedTuple):
-    """Points in and beside a contact.
-
-    Attributes:
-        away: (n,) distance (mm) from the contact, 0 inside it, accurate to about a pitch.
-        from_rim: (n,) distance (mm) from its rim, on either side of it.
-        bend: (n,) greatest second difference of the indenter's slopes on the contact's grid within
-            `BEND_REACH`; 0 beside the contact.
-    """
-
-    away: FloatArray
-    from_rim: FloatArray
-    bend: FloatArray
-
-
 class DisplacementField:
     """Displacement around one contact, on a fine grid inside a coarse one.
 
@@ -78,14 +63,12 @@ class DisplacementField:
         beyond: GridSpline | None = None,
         patch: GelPatch | None = None,
     ) -> None:
-        """Compute the displacement due to a pressure.
+        """Compute the displacement due to a pressure (rows, columns), MPa.
 
         Args:
             overlap: (rows, columns) overlap (mm) of the place, minus the displacement due to other
                 contacts and minus ``beyond``.
-            pressure: (rows, columns) pressure, MPa.
-            beyond: normal displacement of the gel in addition to that of a flat layer.
-            patch: the shape of the gel, from which ``beyond`` was computed.
+            beyond: normal displacement of the gel in addition to that of a flat layer, by a patch.
         """
         self._beyond, self._patch = beyond, patch
         self._shear_modulus = elasticity.shear_modulus
@@ -174,11 +157,8 @@ class DisplacementField:
         x: FloatArray,
         y: FloatArray,
     ) -> FloatArray:
-        """Return the displacement (2, n), mm, along x and y at points of the tangent plane.
-
-        Args:
-            splines_of_grids: its splines along x and y on the fine and on the coarse grid.
-            beyond: splines of the contribution of the gel's shape, if it has one.
+        """Return the displacement (2, n), mm, along x and y at points of the tangent plane, from
+        splines on the fine and on the coarse grid and those of the effect of the gel's shape.
         """
         result = np.concatenate(
             [self._read(x, y, *(both[k].value for both in splines_of_grids)) for k in (0, 1)]
@@ -273,7 +253,7 @@ class DisplacementField:
 
     @cached_property
     def _bends(self) -> FloatArray:
-        """Return `Nearby.bend` on the contact's grid."""
+        """Return the bend of `nearby` on the contact's grid."""
         found = np.zeros(self._touching.shape)
         for slope in self._indenter_slopes:
             for axis in (0, 1):
@@ -288,9 +268,11 @@ class DisplacementField:
         rows, columns, inside = self._cells(x, y)
         return inside & self._touching[rows, columns]
 
-    def nearby(self, x: FloatArray, y: FloatArray) -> Nearby:
-        """Return where points (n,), mm, of the tangent plane lie in or beside the contact, and how
-        smooth the contact is there.
+    def nearby(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return three values (n,) for points (n,), mm, of the tangent plane: the distance (mm)
+        from the contact, 0 inside it and accurate to about a pitch; the distance (mm) from its rim;
+        and the greatest second difference of the indenter's slopes on the contact's grid within
+        `BEND_REACH`, 0 beside the contact.
         """
         rows, columns, inside = self._cells(x, y)
         away = self._away[rows, columns]
@@ -300,7 +282,7 @@ class DisplacementField:
         )
         away[outside] += np.where(beyond > self.place.pitch, beyond, 0.0)
         rim = np.maximum(away, self._depth[rows, columns])
-        return Nearby(away, rim, self._bends[rows, columns])
+        return away, rim, self._bends[rows, columns]
 
     @cached_property
     def _depth(self) -> FloatArray:
@@ -340,11 +322,8 @@ def grid_response(
 def tangential_beyond(
     patch: GelPatch, loads: FloatArray, place: Footprint, shear_modulus: float
 ) -> tuple[GridSpline, GridSpline]:
-    """Return splines of the contribution (mm) of a gel's shape to displacements along x and y.
-
-    Args:
-        loads: (3, rows, columns) loads (MPa) along x and y and into the gel.
-        shear_modulus: shear modulus of the gel, MPa.
+    """Return splines of the contribution (mm) of a gel's shape to displacements along x and y by
+    loads (3, rows, columns), MPa, along x and y and into the gel.
     """
     pitch, start = patch.columns.pitch, (patch.x[0], patch.y[0])
     coarse = np.stack([binned(a, place, start, pitch, patch.shape) for a in loads])

@@ -30,14 +30,11 @@ def dragged(
     drags: Sequence[Drag | None],
     patches: Sequence[GelPatch | None],
 ) -> PressedSkin:
-    """Return a pressed skin whose indenters were then dragged with friction.
+    """Return a pressed skin whose indenters were then dragged with friction, if they have a motion.
 
     Contacts drag each other's skin along, so they are solved in turn until the displacements
-    converge. Indenters that are not dragged do not hold the skin.
-
-    Args:
-        drags: the motion of each indenter along the skin; None without one.
-        patches: the gel's shape around each contact; None where it is a flat layer.
+    converge. Indenters that are not dragged do not hold the skin. A patch is the gel's shape around
+    a contact; None where it is a flat layer.
 
     Raises:
         ContactError: a shear does not converge; the error tells the residual.
@@ -74,11 +71,7 @@ def _shear(
     contact: Pressed, wanted: FloatArray, elasticity: Elasticity, patch: GelPatch | None
 ) -> FloatArray:
     """Return the shear (2, rows, columns), MPa, under one indenter; it and the correction for the
-    gel's shape are iterated.
-
-    Args:
-        wanted: (2, rows, columns) displacement (mm) along x and y of skin that sticks, less that
-            due to other contacts.
+    gel's shape are iterated until skin that sticks moves as ``wanted`` (2, rows, columns), mm.
     """
     place, pressure, friction = contact.place, contact.pressure, elasticity.friction
     response = grid_response(pressure.shape, place.pitch, place.thickness, elasticity)

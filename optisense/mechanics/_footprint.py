@@ -176,14 +176,11 @@ def _extent(body: TriangleMesh, skin: TriangleMesh) -> FloatArray | None:
 def _places_below(
     triangles: FloatArray, height: FloatArray, x: FloatArray, y: FloatArray
 ) -> FloatArray:
-    """Return (n, 2) x and y (mm) of the corners of triangles below a skin, and of the places where
-    their edges cross the skin.
+    """Return (n, 2) x and y (mm) of the corners of triangles (faces, 3, 3) below a skin, and of the
+    places where their edges cross the skin.
 
-    Args:
-        triangles: (faces, 3, 3) corners in the frame of a contact, mm.
-        height: (rows, columns) heights (mm) of the skin on a grid, which are interpolated; minus
-            infinity where there is no skin.
-        x, y: (columns,) and (rows,) coordinates of the grid, mm.
+    The heights (rows, columns), mm, of the skin on a grid, minus infinity without skin, are
+    interpolated.
     """
     known = np.where(np.isfinite(height), height, NO_OVERLAP)
     column = ((triangles[..., 0] - x[0]) / (x[1] - x[0])).clip(0.0, len(x) - 1)
@@ -230,11 +227,8 @@ def _overlap(body: TriangleMesh, skin: TriangleMesh, x: FloatArray, y: FloatArra
 
 
 def outer_faces(skin: TriangleMesh, x: FloatArray, y: FloatArray) -> TriangleMesh:
-    """Return the faces of a skin that face outward and lie in the rectangle of a grid.
-
-    Args:
-        skin: a skin in the frame of a contact, mm.
-        x, y: (columns,) and (rows,) coordinates of the grid, mm.
+    """Return the faces of a skin, in the frame of a contact, that face outward and lie in the
+    rectangle of a grid with coordinates x (columns,) and y (rows,), mm.
     """
     low, high = skin.face_bounds
     near = (high[:, 0] >= x[0]) & (low[:, 0] <= x[-1]) & (high[:, 1] >= y[0]) & (low[:, 1] <= y[-1])

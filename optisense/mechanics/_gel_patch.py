@@ -77,13 +77,8 @@ class GelPatch:
         poisson_ratio: float,
         share: float = 1.0,
     ) -> None:
-        """Set up the elements.
-
-        Args:
-            loaded: half sides (mm) of the rectangle in which loads lie.
-            thickness: thickness (mm) of the flat layer to which the response is compared.
-            poisson_ratio: Poisson's ratio of the gel.
-            share: share of the difference that is returned, 0 for a flat layer to 1.
+        """Set up the elements for loads in a rectangle with half sides ``loaded`` (mm); a share
+        (0 to 1) of the difference is returned.
         """
         self.columns, self.thickness, self._nu = columns, thickness, poisson_ratio
         self._share = share
@@ -103,15 +98,9 @@ class GelPatch:
         ]
 
     def correction(self, force: FloatArray) -> FloatArray:
-        """Return the displacement beyond that of a flat layer, along the normal of the tangent
-        plane.
-
-        Args:
-            force: (rows, columns) force at each point of the grid along this normal, N over the
-                shear modulus in MPa.
-
-        Returns:
-            The displacement (rows, columns) into the gel, mm.
+        """Return the displacement (rows, columns), mm, into the gel, along the normal of the
+        tangent plane, beyond that of a flat layer by forces (rows, columns) along this normal, N
+        over the shear modulus in MPa.
         """
         if not force.any():
             return np.zeros(self.shape)
@@ -122,15 +111,11 @@ class GelPatch:
         return self._on_grid(inside + self._beside.total(loads))
 
     def tangential(self, force: FloatArray) -> FloatArray:
-        """Return the displacement beyond that of a flat layer, along the tangent plane.
+        """Return the displacement (2, rows, columns), mm, along x and y of the tangent plane beyond
+        that of a flat layer.
 
-        Args:
-            force: (3, rows, columns) forces at each point of the grid along x and y of the
-                contact's frame and into the gel, N over the shear modulus in MPa. The forces along
-                x and y act along the skin, the others along its normals.
-
-        Returns:
-            The displacement (2, rows, columns) along x and y, mm.
+        Forces (3, rows, columns), N over the shear modulus in MPa, are those along x and y, which
+        act along the skin, and into the gel, along its normals.
         """
         given = self._on_sources(force)
         normals = self._inward[self._sources]
@@ -148,12 +133,8 @@ class GelPatch:
         return np.stack([self._on_grid(each) for each in rest[:, :2].T + beside])
 
     def _beside_tangential(self, axis: int, new: IntArray) -> FloatArray:
-        """Return the displacement (2, columns, new) along x and y of the half-spaces minus that of
-        the flat layer.
-
-        Args:
-            axis: axis of the forces in the frames of the sources.
-            new: (new,) numbers of the sources.
+        """Return the displacement (2, columns, new) along x and y of the half-spaces of new sources
+        by forces along an axis of their frames, minus that of the flat layer.
         """
         frames = self._frames[new]
         moved = self._in_frame(
@@ -299,11 +280,7 @@ class GelPatch:
 
     def _right_side(self, axis: int, new: IntArray) -> FloatArray:
         """Return the right sides (free, new) that cancel the half-spaces' displacements on the
-        base, and their stresses on free faces.
-
-        Args:
-            axis: axis of the forces in the frames of the sources.
-            new: (new,) numbers of the sources.
+        base, and their stresses on free faces, by forces along an axis of new sources' frames.
         """
         elements = self._elements
         moved = point_load.displacements(self._offsets(elements.fixed, new), self._nu, axis)
@@ -319,13 +296,8 @@ class GelPatch:
     def _tractions(
         self, axis: int, new: IntArray, points: FloatArray, normals: FloatArray
     ) -> FloatArray:
-        """Return the forces (new, n, 3) of the half-spaces on Gauss points of faces.
-
-        Args:
-            axis: axis of the forces in the frames of the sources.
-            new: (new,) numbers of the sources.
-            points: (faces, 4, 3) Gauss points, mm.
-            normals: (faces, 4, 3) outward normals, times each point's share of the area.
+        """Return the forces (new, n, 3) of the half-spaces on Gauss points (faces, 4, 3) of faces,
+        with outward normals (faces, 4, 3) times each point's share of the area.
         """
         offsets = self._offsets(points.reshape(-1, 3), new)
         out = normals.reshape(-1, 3) @ self._frames[new]

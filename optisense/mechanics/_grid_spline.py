@@ -129,17 +129,10 @@ def binned(
     step: float,
     shape: tuple[int, int],
 ) -> FloatArray:
-    """Return a pressure on a coarser grid with the same force and centre, distributed linearly.
+    """Return a pressure (rows, columns), MPa, on a coarser grid of some shape with the same force
+    and centre, distributed linearly.
 
-    Args:
-        pressure: (rows, columns) pressure, MPa.
-        place: its grid.
-        start: x and y of the first point of the coarser grid, mm.
-        step: pitch of the coarser grid, mm.
-        shape: its numbers of rows and columns.
-
-    Returns:
-        The pressure (shape), MPa.
+    The first point of the coarser grid is at ``start`` (x and y), and its pitch is ``step``, mm.
     """
     column = (place.x - start[0]) / step
     row = (place.y - start[1]) / step

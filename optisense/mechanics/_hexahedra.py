@@ -32,15 +32,11 @@ IN_THE_CELL = _slopes_in_the_cell()
 
 
 def stiffnesses(corners: FloatArray, poisson_ratio: float) -> FloatArray:
-    """Return stiffness matrices (m, 24, 24) for a shear modulus of 1; degrees of freedom are
-    ordered node by node.
+    """Return stiffness matrices (m, 24, 24) of elements with corners (m, 8, 3), mm, for a shear
+    modulus of 1; degrees of freedom are ordered node by node.
 
     The dilatation is the element's mean (Hughes, "Generalization of selective integration
     procedures to anisotropic and nonlinear media", Int. J. Numer. Methods Eng. 15, 1980).
-
-    Args:
-        corners: (m, 8, 3) corners of each element, mm.
-        poisson_ratio: Poisson's ratio, below 0.5.
     """
     count = len(corners)
     slopes, weights = _shape_slopes(corners)
@@ -81,14 +77,9 @@ def _shape_slopes(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def face_points(corners: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the Gauss points of faces, at which loads are evaluated.
-
-    Args:
-        corners: (m, 4, 3) corners of each face (mm), x first; the normal is x cross y.
-
-    Returns:
-        The points (m, 4, 3), mm; normals (m, 4, 3) times each point's share of the area; and the
-        weights (4, 4) of the corners (columns) at each point (rows).
+    """Return the Gauss points (m, 4, 3), mm, of faces with corners (m, 4, 3), x first; normals (m,
+    4, 3), x cross y, times each point's share of the area; and the weights (4, 4) of the corners
+    (columns) at each point (rows).
     """
     x, y = FACE_GAUSS.T
     signs = np.array([(-1, -1), (1, -1), (-1, 1), (1, 1)])

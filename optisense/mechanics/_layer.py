@@ -134,14 +134,8 @@ def _corrections(poisson_ratio: float) -> _Corrections:
 
 
 def layer_correction(distance: FloatArray, poisson_ratio: float) -> FloatArray:
-    """Return the normal displacement of a layer by a point force, minus that of a half-space.
-
-    Args:
-        distance: (...) distance from the force, 0 to `FARTHEST` thicknesses.
-        poisson_ratio: Poisson's ratio, below 0.5.
-
-    Returns:
-        The displacement (...), mm, for 1 N, a thickness of 1 mm and a shear modulus of 1 MPa.
+    """Return the normal displacement (...), mm, of a layer by a point force, minus that of a
+    half-space, at distances (...) from 0 to `FARTHEST` thicknesses, for 1 N, 1 mm and 1 MPa.
     """
     return np.asarray(_corrections(poisson_ratio).normal(distance))
 

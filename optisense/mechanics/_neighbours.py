@@ -35,11 +35,8 @@ class Neighbours:
     def set_displacement(
         self, number: int, moved: Callable[[FloatArray, FloatArray], FloatArray]
     ) -> None:
-        """Set the displacement by a contact that was solved, which replaces an earlier one.
-
-        Args:
-            moved: function that returns the displacement (3, n) at coordinates x and y (n,) of the
-                contact's tangent plane.
+        """Set the displacement by a contact that was solved, which replaces an earlier one, as a
+        function that returns it (3, n) at coordinates x and y (n,) of the tangent plane.
         """
         others = [k for k in range(len(self._places)) if k != number]
         if not others:
@@ -56,10 +53,8 @@ class Neighbours:
             self._caused[number][k] = found.reshape(3, *shape)
 
     def at(self, number: int, axis: int) -> FloatArray:
-        """Return the displacement (rows, columns), mm, on a contact's grid due to others.
-
-        Args:
-            axis: axis along which it is returned, one of `ALONG` or `OUTWARD`.
+        """Return the displacement (rows, columns), mm, on a contact's grid due to others, along one
+        of the axes `ALONG` and `OUTWARD`.
         """
         place = self._places[number]
         caused = [at_places[number][axis] for at_places in self._caused if number in at_places]

@@ -28,11 +28,8 @@ def solve_normal_contact(
     constrained conjugate gradient of Polonsky and Keer, "A numerical method for solving rough
     contact problems", Wear 231 (1999), for a given approach in place of a given force.
 
-    Args:
-        overlap: (rows, columns) depth (mm) of the undeformed skin inside the indenter; negative
-            where there is a gap.
-        start: initial pressure, MPa.
-        tolerance: tolerance at which the iteration ends; above `TOLERANCE` for interim results.
+    The overlap (rows, columns) is the depth (mm) of the undeformed skin inside the indenter,
+    negative where there is a gap. Interim results have a tolerance above `TOLERANCE`.
 
     Raises:
         ContactError: the iteration does not converge.
@@ -90,15 +87,12 @@ def _first(response: GridResponse, overlap: FloatArray) -> tuple[FloatArray, Flo
 
 
 def contact_area(pressure: FloatArray, pitch: float) -> float:
-    """Return the area (mm^2) of a contact, more finely than the grid's squares.
+    """Return the area (mm^2) of a contact with a pressure (rows, columns), more finely than the
+    grid's squares.
 
     The pressure of smooth contacts falls to 0 as the square root of the distance from the rim. Its
     square is therefore extrapolated to 0 beyond the outermost points, along rows and along columns.
     If it does not fall, as at the edge of a flat punch, squares count whole.
-
-    Args:
-        pressure: (rows, columns) pressure, MPa.
-        pitch: side of a square, mm.
     """
     touching = pressure > 0.0
     square = np.pad(pressure, 1) ** 2

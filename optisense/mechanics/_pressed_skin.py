@@ -146,17 +146,23 @@ class PressedSkin:
         For an indenter that was dragged or turned, shear force (N) and torque (N mm) are included;
         a warning is, if there is one.
         """
-        return [
-            {
-                "depth_mm": round(contact.place.depth, 6),
-                "force_n": round(contact.force, 6),
-                "area_mm2": round(contact.area, 6),
-                "greatest_pressure_mpa": round(float(contact.pressure.max()), 6),
-                **_shear_in_numbers(contact),
-                **({"warning": contact.warning} if contact.warning else {}),
-            }
-            for contact in self.contacts
-        ]
+        found: list[dict[str, float | str]] = []
+        for contact in self.contacts:
+            found.append(
+                {
+                    "depth_mm": round(contact.place.depth, 6),
+                    "force_n": round(contact.force, 6),
+                    "area_mm2": round(contact.area, 6),
+                    "greatest_pressure_mpa": round(float(contact.pressure.max()), 6),
+                }
+            )
+            if contact.shear is not None:
+                shear_force = float(np.linalg.norm(contact.shear_force))
+                found[-1]["shear_force_n"] = round(shear_force, 6)
+                found[-1]["torque_nmm"] = round(contact.torque, 6)
+            if contact.warning:
+                found[-1]["warning"] = contact.warning
+        return found
 
     def maps(self, points: NDArray[np.floating], inward: NDArray[np.floating]) -> SkinMaps:
         """Return pressure, penetration and displacement at points of the deformed skin.
@@ -211,15 +217,12 @@ def press(
     elasticity: Elasticity,
     patches: Sequence[GelPatch | None] | None = None,
 ) -> PressedSkin:
-    """Press indenters into a gel without friction.
+    """Press indenters, whose footprints on the undeformed skin are known, into a gel without
+    friction.
 
     Around each contact the gel is a flat layer of the local thickness, bonded to a rigid base,
-    corrected for its shape by a patch. Contacts change each other's overlap, so they are solved in
-    turn until the displacements converge.
-
-    Args:
-        places: the footprint of each indenter on the undeformed skin.
-        patches: the gel's shape around each place; None where it is a flat layer.
+    corrected for its shape by a patch if it has one. Contacts change each other's overlap, so they
+    are solved in turn until the displacements converge.
 
     Raises:
         ContactError: a pressure does not converge; the error tells the residual.
@@ -255,14 +258,7 @@ def press(
 
 
 def refuse_unsettled(what: str, turns: int, change: float) -> None:
-    """Refuse the result of an iteration that ends far from its solution.
-
-    Args:
-        change: last change of the displacements, mm.
-
-    Raises:
-        ContactError: the last change is `UNSETTLED` or more.
-    """
+    """Raise ContactError if the last change (mm) of an iteration is `UNSETTLED` or more."""
     if change < UNSETTLED:
         return
     raise ContactError(
@@ -270,15 +266,6 @@ def refuse_unsettled(what: str, turns: int, change: float) -> None:
         f"moved the skin by {change:.2g} mm, where {UNSETTLED:g} mm would do",
         hint="Press less deep, move contacts apart, or away from the sides of the gel",
     )
-
-
-def _shear_in_numbers(contact: Pressed) -> dict[str, float]:
-    if contact.shear is None:
-        return {}
-    return {
-        "shear_force_n": round(float(np.linalg.norm(contact.shear_force)), 6),
-        "torque_nmm": round(contact.torque, 6),
-    }
 
 
 def _pressed(

@@ -25,11 +25,7 @@ class Relaxation:
         self._share = 1.0
 
     def next(self, found: FloatArray) -> FloatArray:
-        """Return the next argument (...), from the result of the last one.
-
-        Args:
-            found: (...) result of the function for the last argument.
-        """
+        """Return the next argument (...), from the result (...) of the last one."""
         change = found - self._values
         if self._change is not None:
             turn = change - self._change

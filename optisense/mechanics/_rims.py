@@ -30,8 +30,6 @@ the force is more than 4 %; measured with a ball of radius 1.5 mm on the pad of 
 AT_SIDE = 20
 """Largest error (%) of that force, at the side, where it is too small. Measured as above, against
 columns a fifth as far apart."""
-STEEP = "skin that is steeper than 60 degrees against it"
-"""Description of the skin for which there are no elements (`gel_columns.LEAST_UPRIGHT`)."""
 
 
 def rims_in_words(design: SensorDesign) -> str:
@@ -49,18 +47,14 @@ class Rims:
         self._skin = skin
 
     def warning(self, place: Footprint, patch: GelPatch | None) -> str:
-        """Return a sentence about the error of a contact's force; empty if there is none.
-
-        Args:
-            patch: the elements around the contact, if there are any.
-        """
+        """Return a sentence about the error of a contact's force; empty if there is none."""
         at = "the contact at ({:.2f}, {:.2f}, {:.2f}) mm".format(*place.origin)
         upright = -(self._skin.face_normals @ place.axes[:, 2])
         steep = self._distance(np.flatnonzero(upright < LEAST_UPRIGHT), place.origin, STEEP_RIM)
         if steep < STEEP_RIM:
             return (
-                f"{at} is {steep:.1f} mm from {STEEP}; within {STEEP_RIM:g} mm of such a rim, "
-                "forces are not reliable"
+                f"{at} is {steep:.1f} mm from skin that is steeper than 60 degrees against it; "
+                f"within {STEEP_RIM:g} mm of such a rim, forces are not reliable"
             )
         if self._turns_beside(place):
             return (
