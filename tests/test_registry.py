@@ -394,7 +394,7 @@ def built_in_registries() -> list[Registry]:
     """All registries of this package."""
     from optisense.objectives.registry import OBJECTIVES
     from optisense.robots.formats import ROBOT_FORMATS
-    from optisense.workshop._formats import FORMATS
+    from optisense.workshop.formats import FORMATS
 
     kinds = [kind.kinds for kind in KindModel.__subclasses__()]
     return [INDENTERS, OBJECTIVES, ROBOT_FORMATS, METHODS, SENSORS, FORMATS, *kinds]

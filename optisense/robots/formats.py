@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from optisense.design import SensorDesign
-from optisense.earlier_results import holds_earlier_results, refuse_to_replace
 from optisense.errors import OutputError, OwnCodeError
 from optisense.registry import Registry, must_be
 from optisense.robots._body import SensorBody, sensor_body
 from optisense.robots._mjcf import mjcf
 from optisense.robots._urdf import urdf, without_friction
-from optisense.workshop.export import notes_on_others, twin_of, twins
-from optisense.workshop.mesh_formats import stl_bytes_of
-from optisense.writing import inside, written_together
+from optisense.workshop.export import bytes_writer, twin_of, twins, write_all
+from optisense.workshop.formats import stl_bytes_of
 
 MESHES = "meshes"
 """Folder of the mesh files, beside the files that name them."""
@@ -68,8 +66,6 @@ def export_robot(
     No file appears under its own name before all are written.
 
     Args:
-        design: the design.
-        folder: folder for the files.
         formats: one name in `ROBOT_FORMATS`, or several.
         notes: list to which notes about the files are added, one sentence each.
         mass: mass of the whole sensor, g; see `sensor_body`.
@@ -87,23 +83,19 @@ def export_robot(
     wanted = [formats] if isinstance(formats, str) else formats
     kinds = [ROBOT_FORMATS.find(name) for name in dict.fromkeys(wanted)]
     body = sensor_body(design, mass=mass, densities=densities)
-    files = {f"{body.name}{kind.suffix}": _text_of(kind, body).encode() for kind in kinds}
+    files = {
+        f"{body.name}{kind.suffix}": bytes_writer(_text_of(kind, body).encode()) for kind in kinds
+    }
     for each in (*body.looks, *body.hulls):
         file = f"{MESHES}/{each.name}.stl"
         twin = twin_of(file, files)
         if twin is not None:
             raise twins(file, twin, Path(twin).stem)
-        files[file] = stl_bytes_of(f"{each.name}, metres", each.mesh)
-    again = holds_earlier_results(folder, MARK)
-    refuse_to_replace(folder, files, MARK)
-    finals = [inside(Path(folder), name) for name in files]
-    with written_together("the files for a robot simulator") as stage:
-        for final, data in zip(finals, files.values(), strict=True):
-            stage(final).write_bytes(data)
+        files[file] = bytes_writer(stl_bytes_of(f"{each.name}, metres", each.mesh))
+    told = body.notes + [kind.note(body) for kind in kinds if kind.note is not None]
+    finals = write_all(Path(folder), files, MARK, "the files for a robot simulator", told)
     if notes is not None:
-        notes += body.notes
-        notes += [kind.note(body) for kind in kinds if kind.note is not None]
-        notes += notes_on_others(Path(folder), finals) if again else []
+        notes += told
     return finals
 
 

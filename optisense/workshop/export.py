@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,12 +14,12 @@ from optisense.errors import DesignError, OutputError
 from optisense.workshop._assembly_files import assembly_files
 from optisense.workshop._bill_of_materials import bill_of_materials
 from optisense.workshop._drawings import cut_file, drawing
-from optisense.workshop._formats import FORMATS, ShapeFormat
 from optisense.workshop._moulds import moulds
 from optisense.workshop._placement import placement_csv, placements
 from optisense.workshop._plates import plates
+from optisense.workshop.formats import FORMATS, ShapeFormat
 from optisense.workshop.shapes import Shape, shapes
-from optisense.writing import written_together
+from optisense.writing import inside, written_together
 
 PLACEMENT_FILE = "pick-and-place.csv"
 BILL_FILES = ("bill-of-materials.csv", "bill-of-materials.md")
@@ -80,8 +80,8 @@ def export(
     for plate in plates(made):
         outline = cut_file(plate).encode("ascii")
         sheet = drawing(plate, design.name).encode("utf-8")
-        _add(writers, f"{plate.name}-cut.dxf", _bytes_writer(outline), plate.name)
-        _add(writers, f"{plate.name}-drawing.svg", _bytes_writer(sheet), plate.name)
+        _add(writers, f"{plate.name}-cut.dxf", bytes_writer(outline), plate.name)
+        _add(writers, f"{plate.name}-drawing.svg", bytes_writer(sheet), plate.name)
     bill = bill_of_materials(design)
     placed = placements(design)
     for file, text in (
@@ -90,8 +90,8 @@ def export(
         (BILL_FILES[0], bill.csv()),
         (BILL_FILES[1], bill.markdown()),
     ):
-        _add(writers, file, _bytes_writer(text.encode("utf-8")))
-    return _write_all(Path(folder), writers, [] if notes is None else notes)
+        _add(writers, file, bytes_writer(text.encode("utf-8")))
+    return write_all(Path(folder), writers, MARK, "the workshop's files", notes)
 
 
 def _add_shapes(
@@ -166,36 +166,41 @@ def file_name(title: str) -> str:
     return re.sub(r"[^A-Za-z0-9_-]+", "-", title).strip("-")[:64] or "design"
 
 
-def _bytes_writer(data: bytes) -> Writer:
+def bytes_writer(data: bytes) -> Writer:
+    """Return a function that writes bytes into a file."""
+
     def write(path: Path) -> None:
         path.write_bytes(data)
 
     return write
 
 
-def _write_all(folder: Path, writers: dict[str, Writer], notes: list[str]) -> list[Path]:
+def write_all(
+    folder: Path,
+    writers: Mapping[str, Writer],
+    mark: tuple[str, str],
+    what: str,
+    notes: list[str] | None,
+) -> list[Path]:
     """Write each file under a temporary name, and rename them when all are complete; a list that a
-    writer returns is added to the notes.
+    writer returns is added to the notes, and a note on files of earlier exports with this mark.
     """
-    again = holds_earlier_results(folder, MARK)
-    refuse_to_replace(folder, writers, MARK)
-    finals = [folder / file for file in writers]
-    with written_together("the workshop's files") as stage:
+    again = holds_earlier_results(folder, mark)
+    refuse_to_replace(folder, writers, mark)
+    finals = [inside(folder, file) for file in writers]
+    told: list[str] = [] if notes is None else notes
+    with written_together(what) as stage:
         for final, write in zip(finals, writers.values(), strict=True):
             found = write(stage(final))
-            notes += found if isinstance(found, list) else []
+            told += found if isinstance(found, list) else []
     if again:
-        notes += notes_on_others(folder, finals)
+        told += _notes_on_others(folder, finals)
     return finals
 
 
-def notes_on_others(folder: Path, written: Sequence[Path]) -> list[str]:
-    """Return a note that names the files beside those of an export, which an earlier one may have
-    written; none if there are no others.
-
-    Args:
-        folder: folder of the export.
-        written: files of the export, in the folder and in its subfolders.
+def _notes_on_others(folder: Path, written: Sequence[Path]) -> list[str]:
+    """Return a note that names the files beside those of an export, in the folder and in its
+    subfolders, which an earlier one may have written; none if there are no others.
     """
     found: list[str] = []
     for place in dict.fromkeys(path.parent for path in written):

@@ -18,7 +18,7 @@ from optisense.geometry import TriangleMesh
 from optisense.geometry.solids import bodies, united
 from optisense.workshop import bill_of_materials, export
 from optisense.workshop._step_format import write_step
-from optisense.workshop.mesh_formats import NAMESPACE, three_mf_bytes
+from optisense.workshop.formats import NAMESPACE, three_mf_bytes
 from optisense.workshop.shapes import Shape, shapes
 
 SINGLE = 1e-6

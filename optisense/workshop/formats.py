@@ -1,16 +1,23 @@
-"""Shapes as STL and 3MF files; lengths in mm."""
+"""File formats in which parts are exported, in mm: STL, OBJ, 3MF, STEP and those of other
+packages."""
 
 from __future__ import annotations
 
 import io
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from optisense.errors import OutputError
 from optisense.geometry import TriangleMesh
+from optisense.geometry.mesh_files import obj_text
+from optisense.registry import Registry, must_be
 from optisense.text import one_line, to_html
+from optisense.workshop._step_format import require_step, write_step
 from optisense.workshop.shapes import Shape
 
 LONG_AGO = (1980, 1, 1, 0, 0, 0)
@@ -74,7 +81,7 @@ def three_mf_bytes(title: str, shapes: Sequence[Shape]) -> bytes:
 def _model(title: str, shapes: Sequence[Shape]) -> Iterator[str]:
     yield '<?xml version="1.0" encoding="UTF-8"?>'
     yield f'<model unit="millimeter" xml:lang="en-US" xmlns="{NAMESPACE}">'
-    yield f"<metadata name={quoteattr('Title')}>{_text(title)}</metadata>"
+    yield f"<metadata name={quoteattr('Title')}>{to_html(one_line(title))}</metadata>"
     yield '<metadata name="Application">OptiSense Studio</metadata>'
     yield "<resources>"
     for number, shape in enumerate(shapes, start=1):
@@ -100,7 +107,57 @@ def _mesh(mesh: TriangleMesh) -> Iterator[str]:
     yield "</triangles></mesh>"
 
 
-def _text(text: str) -> str:
-    """Return text for XML elements, without characters that XML does not allow."""
+@dataclass(frozen=True)
+class ShapeFormat:
+    """File format for the shapes of a design, in mm.
 
-    return to_html(one_line(text))
+    Attributes:
+        suffix: suffix of the file name, with its dot.
+        write: function that writes a file, called with its path, the name of the design and the
+            shapes. It may return a list of notes.
+        holds_all: whether one file holds all shapes; otherwise each shape has a file of its own.
+        require: function called before any work; raises `SetupError` if a package is missing.
+        note: note for the user before a long export; empty if there is none.
+    """
+
+    suffix: str
+    write: Callable[[Path, str, Sequence[Shape]], object]
+    holds_all: bool = False
+    require: Callable[[], None] = lambda: None
+    note: str = ""
+
+
+STL = ShapeFormat(".stl", lambda path, title, shapes: path.write_bytes(stl_bytes(shapes[0])))
+OBJ = ShapeFormat(
+    ".obj",
+    lambda path, title, shapes: path.write_text(
+        obj_text(shapes[0].mesh, shapes[0].name), encoding="ascii"
+    ),
+)
+THREE_MF = ShapeFormat(
+    ".3mf",
+    lambda path, title, shapes: path.write_bytes(three_mf_bytes(title, shapes)),
+    holds_all=True,
+)
+STEP = ShapeFormat(
+    ".step",
+    lambda path, title, shapes: write_step(path, shapes, title),
+    holds_all=True,
+    require=require_step,
+    note="writing STEP; a finely cut part of no simple shape takes half a minute",
+)
+
+
+FORMATS: Registry[ShapeFormat] = Registry(
+    "file format",
+    "optisense.formats",
+    OutputError,
+    {
+        "stl": "optisense.workshop.formats:STL",
+        "obj": "optisense.workshop.formats:OBJ",
+        "3mf": "optisense.workshop.formats:THREE_MF",
+        "step": "optisense.workshop.formats:STEP",
+    },
+    must_be(ShapeFormat, OutputError, "file format"),
+)
+"""Registry of all formats; other packages add theirs as entry points `optisense.formats`."""
