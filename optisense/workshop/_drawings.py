@@ -18,7 +18,7 @@ from optisense.array_types import FloatArray
 from optisense.text import to_html
 from optisense.workshop._dxf import Pair, arc, circle, dxf, line
 from optisense.workshop._plates import Circle, Plate
-from optisense.workshop._profiles import OutlinePiece, centre_of
+from optisense.workshop._profiles import OutlinePiece
 from optisense.workshop._sheet import LETTER, STYLE, TEXT, DrawingSheet, apart, number
 
 GAP = 16.0
@@ -68,23 +68,13 @@ def _cut(piece: OutlinePiece) -> Iterator[list[Pair]]:
     if piece.kind == "line":
         yield line("CUT", *piece.points.tolist())
     elif piece.kind == "arc":
-        centre = centre_of(*piece.points)
-        assert centre is not None
-        start, _, end = np.degrees(np.arctan2(*(piece.points - centre).T[::-1])).tolist()
-        if not _is_anticlockwise(piece.points):
-            start, end = end, start
-        radius = float(np.linalg.norm(piece.points[0] - centre))
-        yield arc("CUT", centre.tolist(), radius, start % 360.0, end % 360.0)
+        centre, radius, first, sweep = piece.arc()
+        start, end = np.degrees(sorted((first, first + sweep))) % 360.0
+        yield arc("CUT", centre.tolist(), radius, float(start), float(end))
     else:
         points = _through(piece.points)
         for one, other in zip(points[:-1].tolist(), points[1:].tolist(), strict=True):
             yield line("CUT", one, other)
-
-
-def _is_anticlockwise(points: FloatArray) -> bool:
-    """Return whether an arc through three points (3, 2) turns anticlockwise."""
-    (ax, ay), (bx, by) = points[1] - points[0], points[2] - points[1]
-    return bool(ax * by - ay * bx > 0.0)
 
 
 def _through(points: FloatArray) -> FloatArray:
@@ -160,13 +150,8 @@ def _plan(sheet: DrawingSheet, outline: Circle | list[OutlinePiece], corner: Flo
         if piece.kind == "line":
             moves.append(f"L {sheet.at(points[1])}")
         elif piece.kind == "arc":
-            centre = centre_of(*points)
-            assert centre is not None
-            radius = float(np.linalg.norm(points[0] - centre))
-            turns = _is_anticlockwise(points)
-            a, b = (float(np.arctan2(*(points[k] - centre)[::-1])) for k in (0, 2))
-            swept = ((b - a) if turns else (a - b)) % (2.0 * np.pi)
-            flags = f"{int(swept > np.pi)} {int(not turns)}"
+            _, radius, _, sweep = piece.arc()
+            flags = f"{int(abs(sweep) > np.pi)} {int(sweep < 0.0)}"
             moves.append(f"A {radius:.4f} {radius:.4f} 0 {flags} {sheet.at(points[2])}")
         else:
             moves += [f"L {sheet.at(point)}" for point in _through(points)[1:]]
@@ -189,13 +174,7 @@ def _fine(piece: OutlinePiece) -> FloatArray:
         return piece.points
     if piece.kind == "curve":
         return _through(piece.points)
-    centre = centre_of(*piece.points)
-    assert centre is not None
-    a, b = (float(np.arctan2(*(piece.points[k] - centre)[::-1])) for k in (0, 2))
-    swept = (b - a) % (2.0 * np.pi) if _is_anticlockwise(piece.points) else -((a - b) % (2 * np.pi))
-    radius = float(np.linalg.norm(piece.points[0] - centre))
-    angles = a + swept * np.linspace(0.0, 1.0, 33)
-    return np.asarray(centre + radius * np.column_stack([np.cos(angles), np.sin(angles)]))
+    return piece.arc().points(33)
 
 
 def _beside(
@@ -307,16 +286,12 @@ def _slot(outline: list[OutlinePiece]) -> tuple[float, float, float] | None:
     """
     if [piece.kind for piece in outline] != ["line", "arc", "line", "arc"]:
         return None
-    one, other = (outline[k].points for k in (1, 3))
-    widths = [float(np.linalg.norm(end[2] - end[0])) for end in (one, other)]
-    centres = [centre_of(*end) for end in (one, other)]
-    assert centres[0] is not None and centres[1] is not None
-    radii = [
-        float(np.linalg.norm(end[0] - c)) for end, c in zip((one, other), centres, strict=True)
-    ]
-    if np.ptp([*widths, *(2.0 * radius for radius in radii)]) > SAME:
+    ends = outline[1], outline[3]
+    one, other = (end.arc() for end in ends)
+    widths = [float(np.linalg.norm(end.points[2] - end.points[0])) for end in ends]
+    if np.ptp([*widths, 2.0 * one.radius, 2.0 * other.radius]) > SAME:
         return None
-    along = centres[1] - centres[0]
+    along = other.centre - one.centre
     angle = float(np.degrees(np.arctan2(along[1], along[0]))) % 180.0
     return (
         float(np.linalg.norm(along)) + widths[0],
@@ -355,9 +330,7 @@ def _round(sheet: DrawingSheet, plate: Plate, ring: shapely.Polygon, corner: Flo
         if _slot(outline) is not None:
             continue
         for piece in (each for each in outline if each.kind == "arc"):
-            centre = centre_of(*piece.points)
-            assert centre is not None
-            radius = float(np.linalg.norm(piece.points[0] - centre))
+            centre, radius, _, _ = piece.arc()
             way = (piece.points[1] - centre) / radius
             arcs.setdefault(f"R{number(radius)}", []).append((piece.points[1], way))
 

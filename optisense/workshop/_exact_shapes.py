@@ -16,15 +16,16 @@ from optisense.geometry import TriangleMesh
 from optisense.geometry.cage import bernstein, deformed
 from optisense.geometry.connected import connected_components
 from optisense.geometry.step import triangles
-from optisense.workshop._domes import Dome, dome
-from optisense.workshop._occ import SEWN, array_of, compound, numbers, point, sewn, wire
+from optisense.workshop._occ import SEWN, Lift, compound, numbers, point, poles, sewn, wire
 from optisense.workshop._profiles import SMOOTH
 from optisense.workshop._recognised import (
     SAME,
+    Dome,
     Extrusion,
     Revolution,
     across,
     box_sides,
+    dome,
     extrusion_of,
     rims,
     smooth_patches,
@@ -156,9 +157,7 @@ def _through(found: Dome) -> Any:
     around, up = (_lengths(grid, axis) for axis in (0, 1))
     one = make_interp_spline(around, grid, k=3, axis=0)
     both = make_interp_spline(up, one.c, k=3, axis=1)
-    table = array_of("Array2")(1, both.c.shape[1], 1, both.c.shape[0])
-    for v, u in np.ndindex(both.c.shape[:2]):  # SciPy puts the axis of the last spline first
-        table.SetValue(u + 1, v + 1, point(both.c[v, u]))
+    table = poles(both.c.swapaxes(0, 1))  # SciPy puts the axis of the last spline first
     knots, counts = zip(*(np.unique(t, return_counts=True) for t in (one.t, both.t)), strict=True)
     return Geom_BSplineSurface(
         table, *(numbers(each) for each in knots), *(numbers(each) for each in counts), 3, 3
@@ -189,8 +188,6 @@ def _patched_body(mesh: TriangleMesh, solid: bool) -> Any | None:
 
 def _flat_face(mesh: TriangleMesh) -> Any | None:
     """Return a flat patch as one face with its holes; None if it is not flat."""
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
-
     normal = mesh.face_normals[int(mesh.face_areas.argmax())]
     origin = mesh.vertices[0]
     if np.abs((mesh.vertices - origin) @ normal).max() > SAME:
@@ -207,6 +204,13 @@ def _flat_face(mesh: TriangleMesh) -> Any | None:
 
     outlines = [(mesh.vertices[loop] - origin) @ frame.T for loop in loops]
     outlines.sort(key=lambda outline: -abs(shapely.Polygon(outline).area))
+    return _face(outlines, lift)
+
+
+def _face(outlines: Sequence[FloatArray], lift: Lift) -> Any:
+    """Return the flat face in an outline (n, 2) mm, the first one, with the others as holes."""
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
+
     outer, *holes = outlines
     face = BRepBuilderAPI_MakeFace(wire(_anticlockwise(outer, True), lift))
     for hole in holes:
@@ -235,7 +239,6 @@ def _turned_body(found: Revolution, solid: bool) -> Any:
 
 
 def _drawn_body(found: Extrusion, solid: bool) -> Any:
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
     from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism
     from OCP.gp import gp_Vec
 
@@ -250,13 +253,8 @@ def _drawn_body(found: Extrusion, solid: bool) -> Any:
     way = gp_Vec(*((found.high - found.low) * np.eye(3)[found.axis]).tolist())
     if not solid:
         return compound([BRepPrimAPI_MakePrism(wire(o, lift), way).Shape() for o in found.outlines])
-    made = []
-    for outer, *holes in _with_holes(found.outlines):
-        face = BRepBuilderAPI_MakeFace(wire(_anticlockwise(outer, True), lift))
-        for hole in holes:
-            face.Add(wire(_anticlockwise(hole, False), lift))
-        made.append(BRepPrimAPI_MakePrism(face.Face(), way).Shape())
-    return compound(made)
+    faces = [_face(outlines, lift) for outlines in _with_holes(found.outlines)]
+    return compound([BRepPrimAPI_MakePrism(face, way).Shape() for face in faces])
 
 
 def _anticlockwise(outline: FloatArray, wanted: bool) -> FloatArray:
@@ -283,12 +281,8 @@ def _bent_box(sides: Sequence[FloatArray], cage: Cage, solid: bool) -> Any:
 
     faces = []
     for corners in sides:
-        poles = _bezier_points(corners, cage)
-        table = array_of("Array2")(1, poles.shape[0], 1, poles.shape[1])
-        for u in range(poles.shape[0]):
-            for v in range(poles.shape[1]):
-                table.SetValue(u + 1, v + 1, point(poles[u, v]))
-        faces.append(BRepBuilderAPI_MakeFace(Geom_BezierSurface(table), SEWN).Face())
+        surface = Geom_BezierSurface(poles(_bezier_points(corners, cage)))
+        faces.append(BRepBuilderAPI_MakeFace(surface, SEWN).Face())
     return sewn(faces, solid)
 
 

@@ -51,13 +51,17 @@ def numbers(values: NDArray[Any]) -> Any:
     return made
 
 
-def wire(corners: FloatArray, lift: Lift, closing: bool = False) -> Any:
-    """Return the lines, arcs and curves through the corners of an outline, joined.
+def poles(grid: FloatArray) -> Any:
+    """Return a grid of points (m, n, 3), mm, as a table of Open CASCADE."""
+    table = array_of("Array2")(1, grid.shape[0], 1, grid.shape[1])
+    for u, v in np.ndindex(grid.shape[:2]):
+        table.SetValue(u + 1, v + 1, point(grid[u, v]))
+    return table
 
-    Args:
-        corners: corners of the outline, (n, 2) mm.
-        lift: map from the outline's plane to the sensor.
-        closing: whether to add a line from the last corner to the first.
+
+def wire(corners: FloatArray, lift: Lift, closing: bool = False) -> Any:
+    """Return the lines, arcs and curves through the corners (n, 2), mm, of an outline, joined, and
+    a line from the last corner to the first if it is to be closed.
     """
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeWire
     from OCP.GC import GC_MakeArcOfCircle

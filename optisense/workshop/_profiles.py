@@ -38,6 +38,27 @@ CURVE_CORNERS = 6
 circle is a stronger sign than a smooth run."""
 
 
+class Arc(NamedTuple):
+    """Arc of a circle.
+
+    Attributes:
+        centre: centre, (2,) mm.
+        radius: radius, mm.
+        start: angle of its first end, radians.
+        sweep: angle to its other end, radians, positive if anticlockwise.
+    """
+
+    centre: FloatArray
+    radius: float
+    start: float
+    sweep: float
+
+    def points(self, count: int) -> FloatArray:
+        """Return points (count, 2), mm, on it in equal steps."""
+        angles = self.start + self.sweep * np.linspace(0.0, 1.0, count)
+        return self.centre + self.radius * np.column_stack([np.cos(angles), np.sin(angles)])
+
+
 class OutlinePiece(NamedTuple):
     """Part of an outline.
 
@@ -49,12 +70,20 @@ class OutlinePiece(NamedTuple):
     kind: Literal["line", "arc", "curve"]
     points: FloatArray
 
+    def arc(self) -> Arc:
+        """Return the circle of a piece that is an arc, and the angles of its ends."""
+        centre = centre_of(*self.points)
+        assert centre is not None
+        (ax, ay), (bx, by) = np.diff(self.points, axis=0)
+        start, end = (float(np.arctan2(*(self.points[k] - centre)[::-1])) for k in (0, 2))
+        anticlockwise = ax * by - ay * bx > 0.0
+        sweep = (end - start) % (2.0 * np.pi) if anticlockwise else -((start - end) % (2.0 * np.pi))
+        return Arc(centre, float(np.linalg.norm(self.points[0] - centre)), start, sweep)
+
 
 def pieces(corners: FloatArray) -> list[OutlinePiece]:
-    """Return the lines, arcs and curves of an open polygon.
-
-    Args:
-        corners: corners (n, 2), mm, n of at least 2; a closed outline repeats the first at the end.
+    """Return the lines, arcs and curves of an open polygon with corners (n, 2), mm; a closed
+    outline repeats the first at the end.
     """
     found: list[OutlinePiece] = []
     loose: list[int] = []

@@ -16,8 +16,8 @@ from optisense.sensors._digit import CORNERS
 from optisense.sensors._gelsight_svelte import BACK_OUTLINE, PALM_OUTLINE
 from optisense.sensors._half_round import HalfRound
 from optisense.sensors._svelte_profile import FlatMirror, Palm
-from optisense.workshop._domes import dome
 from optisense.workshop._exact_shapes import _through
+from optisense.workshop._recognised import dome
 from optisense.workshop.shapes import Shape, shapes
 
 SAME_VOLUME = 1e-4
