@@ -18,6 +18,7 @@ from optisense.geometry import TriangleMesh
 from optisense.geometry.mesh_points import closest_points
 from optisense.geometry.overlaps import CONTACT
 from optisense.geometry.solids import as_manifold, of_manifold, thick_place, united
+from optisense.mechanics import elasticity_of
 from optisense.robots._collision import COVERED, depth_in, free_hulls, gel_hulls
 from optisense.robots._densities import density_of
 from optisense.workshop.export import file_name
@@ -27,8 +28,6 @@ METRES = 1e-3
 """Length of one mm, m: robot files are in metres, designs in mm."""
 KILOGRAMS = 1e-6
 """Mass of one mm^3 of a density of 1 g/cm^3, kg."""
-USUAL_FRICTION = 1.0
-"""Coefficient of friction of a gel whose material gives none: that of the library's silicones."""
 ASIDE = 1e-2
 """Distance (mm) by which the centroid of a skin is moved to the right to find the point next to it:
 far above the rounding of coordinates in mesh files (2e-6 mm), and far below the size of a skin."""
@@ -130,7 +129,6 @@ def sensor_body(
     transparent ones, and those of higher priority out of others.
 
     Args:
-        design: the design.
         mass: mass of the whole sensor (g), such as a real one weighs; masses of parts are scaled to
             it. Without it the mass is that of the parts.
         densities: densities (g/cm^3) of parts by name; the others have those of
@@ -202,7 +200,7 @@ def sensor_body(
         resolution=camera.resolution,
         skin=skin_frame,
         skin_box=((low + high) / 2.0, (high - low) / 2.0),
-        friction=_friction(design),
+        friction=elasticity_of(design).friction,
         notes=notes,
     )
 
@@ -250,11 +248,8 @@ def _without_overlaps(design: SensorDesign, solids: list[Shape]) -> dict[str, An
 def mass_properties(
     bodies: list[Any], densities: list[float]
 ) -> tuple[float, FloatArray, FloatArray]:
-    """Return the mass (kg), the centre (3,), m, and the inertia (3, 3), kg m^2, about it.
-
-    Args:
-        bodies: closed bodies, each a `manifold3d.Manifold`, mm.
-        densities: mass of one mm^3 of each, kg.
+    """Return the mass (kg), the centre (3,), m, and the inertia (3, 3), kg m^2, about it, of closed
+    bodies (`manifold3d.Manifold`, mm), with the mass (kg) of one mm^3 of each.
     """
     from trimesh.triangles import mass_properties as properties_of
 
@@ -356,13 +351,3 @@ def _tell_of_camera(design: SensorDesign, notes: list[str]) -> None:
         notes.append("the camera's lens distorts, which a simulator's camera does not")
     if design.parts_of(Role.MIRROR):
         notes.append("the camera looks by way of mirrors, which a simulator's camera does not")
-
-
-def _friction(design: SensorDesign) -> float:
-    """Return the friction of the first elastomer whose material gives one."""
-    for name in design.parts_of(Role.ELASTOMER):
-        material = design.materials.get(design.parts[name].material or "")
-        elasticity = getattr(material, "elasticity", None)
-        if elasticity is not None:
-            return float(elasticity.friction)
-    return USUAL_FRICTION

@@ -35,15 +35,10 @@ def depth_in(points: FloatArray, hull: ConvexHull) -> FloatArray:
 
 
 def free_hulls(part: Any, skin: FloatArray) -> tuple[list[Any], bool]:
-    """Return the convex hulls of a part, or of the pieces of it, that do not cover the skin.
+    """Return the convex hulls of a part, or of the pieces of it, that do not cover the vertices (n,
+    3) of the skin, mm, and whether a piece is left out because it would cover the skin in any case.
 
-    Args:
-        part: the part, a `manifold3d.Manifold`.
-        skin: vertices (n, 3) of the sensing surface, mm.
-
-    Returns:
-        The hulls, each a `manifold3d.Manifold`, and whether a piece is left out because it would
-        cover the skin in any case.
+    Part and hulls are objects of type `manifold3d.Manifold`.
     """
     if not _covers(part, skin):
         return [part.hull()], False
@@ -63,12 +58,8 @@ def free_hulls(part: Any, skin: FloatArray) -> tuple[list[Any], bool]:
 
 
 def gel_hulls(gel: Any, skin: FloatArray, cuts: int = MOST_CUTS) -> list[Any]:
-    """Return the convex hulls of a gel, or of slices of it where a hull would cover the skin.
-
-    Args:
-        gel: the gel, a `manifold3d.Manifold`.
-        skin: vertices (n, 3) of the sensing surface, mm.
-        cuts: number of times that a slice may be cut again.
+    """Return the convex hulls of a gel, or of slices of it where a hull would cover the vertices
+    (n, 3) of the skin, mm; a slice is cut again up to some number of times.
     """
     if cuts == 0 or not _covers(gel, skin):
         return [gel.hull()]

@@ -20,11 +20,7 @@ the middle of the picture: only their ratio counts."""
 
 
 def mjcf(body: SensorBody, folder: str) -> str:
-    """Return the text of an MJCF file.
-
-    Args:
-        folder: folder of the mesh files (binary STL, m), beside the file.
-    """
+    """Return the text of an MJCF file with its mesh files (binary STL, m) in a folder beside it."""
     lines = [f"<mujoco model={quoteattr(body.name)}>"]
     lines.append(f'  <compiler angle="radian" meshdir={quoteattr(folder)}/>')
     lines.append("  <asset>")

@@ -11,13 +11,10 @@ from optisense.robots._mjcf import numbers
 
 
 def urdf(body: SensorBody, folder: str) -> str:
-    """Return the text of a URDF file.
+    """Return the text of a URDF file with its mesh files (binary STL, m) in a folder beside it.
 
     The link of the camera has the axes that ROS uses for pictures (REP 103): x to the right, y
     down, z where the camera looks.
-
-    Args:
-        folder: folder of the mesh files (binary STL, m), beside the file.
     """
     name = body.name
     lines = ['<?xml version="1.0"?>', f"<robot name={quoteattr(name)}>"]

@@ -11,10 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from optisense.design import SensorDesign
-from optisense.design.lights import frame_of
 from optisense.library import typical_colour
 from optisense.text import cell
-from optisense.workshop._boards import boards_of
 from optisense.workshop._dxf import closed, dxf
 from optisense.workshop._placement import Placement, what_to_order
 from optisense.workshop._tables import digits, light_entry
@@ -29,30 +27,14 @@ USUAL_BODY = 3.5
 
 def assembly_files(design: SensorDesign, placed: Sequence[Placement]) -> dict[str, str]:
     """Return the text of each file by its name: four for each board."""
-    turns = _turns_on_board(design)
     files: dict[str, str] = {}
     for board in sorted({led.board for led in placed}):
         leds = [led for led in placed if led.board == board]
-        files[f"board-{board}.pos"] = _kicad(design, leds, turns)
-        files[f"board-{board}-cpl.csv"] = _cpl(leds, turns)
+        files[f"board-{board}.pos"] = _kicad(design, leds)
+        files[f"board-{board}-cpl.csv"] = _cpl(leds)
         files[f"board-{board}-bom.csv"] = _bom(design, leds)
         files[f"board-{board}.dxf"] = _outline(design, leds)
     return files
-
-
-def _turns_on_board(design: SensorDesign) -> dict[str, float]:
-    """Return rotations in degrees by designator, seen from in front of the board's top."""
-    lights = [light for group in design.lights.values() for light in group.lights]
-    turns = {}
-    for number, (light, place) in enumerate(zip(lights, boards_of(lights), strict=True), start=1):
-        up = frame_of(light.direction, None)[1] if light.up is None else np.array(light.up)
-        angle = np.degrees(np.arctan2(-(up @ place.right), up @ place.up))
-        turns[f"D{number}"] = float(angle % 360.0)
-    return turns
-
-
-def _name(led: Placement) -> str:
-    return f"{led.model}-{led.group}"
 
 
 def _footprint(design: SensorDesign, led: Placement) -> str:
@@ -68,7 +50,7 @@ def _body(design: SensorDesign, led: Placement) -> tuple[float, float]:
     return entry.package[0], entry.package[1]
 
 
-def _kicad(design: SensorDesign, leds: Sequence[Placement], turns: dict[str, float]) -> str:
+def _kicad(design: SensorDesign, leds: Sequence[Placement]) -> str:
     """Return a position file as KiCad writes them, in its text form."""
     lines = [
         "### Footprint positions ###",
@@ -78,18 +60,19 @@ def _kicad(design: SensorDesign, leds: Sequence[Placement], turns: dict[str, flo
     ]
     for led in leds:
         lines.append(
-            f"{led.designator:<9} {cell(_name(led)):<25} {_footprint(design, led):<20} "
+            f"{led.designator:<9} {cell(f'{led.model}-{led.group}'):<25} "
+            f"{_footprint(design, led):<20} "
             f"{digits(led.on_board[0], 4):>10} {digits(led.on_board[1], 4):>10} "
-            f"{digits(turns[led.designator], 4):>9}  {led.layer}"
+            f"{digits(led.turn_on_board, 4):>9}  {led.layer}"
         )
     return "\n".join([*lines, "## End", ""])
 
 
-def _cpl(leds: Sequence[Placement], turns: dict[str, float]) -> str:
+def _cpl(leds: Sequence[Placement]) -> str:
     """Return JLCPCB's table of positions."""
     rows = [
         (led.designator, *(f"{digits(value, 4)}mm" for value in led.on_board),
-         led.layer.capitalize(), digits(turns[led.designator], 3))
+         led.layer.capitalize(), digits(led.turn_on_board, 3))
         for led in leds
     ]  # fmt: skip
     return csv_table(("Designator", "Mid X", "Mid Y", "Layer", "Rotation"), rows)

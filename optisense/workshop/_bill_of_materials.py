@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 from optisense.design import Role, SensorDesign, Status
 from optisense.library import OVERDRIVEN, AnyEntry, nominal_flux, typical_colour
@@ -66,11 +66,9 @@ class Bill:
         head = ("kind", "name", "quantity", "unit", "used for", "description", "maker", "part",
                 "package_mm", "note", "designators")  # fmt: skip
         rows = [
-            (item.kind, item.name, f"{item.quantity:.4g}", item.unit, cell(item.used_for),
-             cell(item.description), cell(item.maker), cell(item.part), cell(item.package),
-             cell(item.note), cell(item.designators))
+            (item.kind, item.name, f"{item.quantity:.4g}", *map(cell, astuple(item)[3:]))
             for item in self.items
-        ]  # fmt: skip
+        ]
         return csv_table(head, rows)
 
     def markdown(self) -> str:
@@ -83,12 +81,7 @@ class Bill:
         return "\n".join(lines)
 
 
-HEADINGS = {
-    "light": "Lights",
-    "camera": "Camera",
-    "material": "Materials",
-    "coating": "Coating",
-}
+HEADINGS = {"light": "Lights", "camera": "Camera", "material": "Materials", "coating": "Coating"}
 
 
 def bill_of_materials(design: SensorDesign) -> Bill:

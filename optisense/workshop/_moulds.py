@@ -146,10 +146,7 @@ def moulds(made: list[Shape]) -> list[Mould]:
 
 
 def mould_of(gel: Shape, pull: FloatArray) -> Mould:
-    """Return the mould of a gel.
-
-    Args:
-        pull: unit vector (3,) in the direction in which its front half is pulled off.
+    """Return the mould of a gel whose front half is pulled off in a direction (3,).
 
     Raises:
         DesignError: the gel is no solid.
@@ -217,10 +214,8 @@ def _axes(pull: FloatArray, vertices: FloatArray) -> FloatArray:
 
 
 class _Held:
-    """The faces of a gel, and which of them hold a half of the mould that parts at some height.
-
-    Args:
-        local: the gel, with z in the direction of pulling.
+    """The faces of a gel, and which of them hold a half of the mould that parts at some height,
+    with z in the direction of pulling.
     """
 
     def __init__(self, local: TriangleMesh) -> None:
@@ -341,15 +336,10 @@ class _Hole:
 
 
 def _holes(cut: Any) -> tuple[_Hole, _Hole | None]:
-    """Return the sprue and the vent, at the ends of a gel's back, out of the camera's view.
+    """Return the sprue and the vent at the ends of a section of a gel near its back, out of the
+    camera's view; None for a vent that would run into the sprue.
 
     A back of several feet has the vent on the foot that is farthest from the sprue.
-
-    Args:
-        cut: section of the gel near its back.
-
-    Returns:
-        The two holes; None for a vent that would run into the sprue.
     """
     from shapely import Polygon, unary_union
 

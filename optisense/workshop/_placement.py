@@ -36,6 +36,8 @@ class Placement:
         layer: "top", or "bottom" for LEDs that face away from the board's first one.
         on_board: x and y on the board seen from in front of its top, mm: y is up at rest, the
             origin is the projection of the design's origin along the normal.
+        turn_on_board: rotation in degrees, counter-clockwise, seen from in front of the board's
+            top, 0 to 360.
         colour: R, G, B, as in the design.
         flux: radiant flux, mW.
     """
@@ -50,6 +52,7 @@ class Placement:
     board: int
     layer: str
     on_board: tuple[float, float]
+    turn_on_board: float
     colour: tuple[float, float, float]
     flux: float
 
@@ -63,6 +66,8 @@ def placements(design: SensorDesign) -> list[Placement]:
         right, up, forward = frame_of(light.direction, None)
         place = boards[number]
         position = np.array(light.position)
+        own_up = up if light.up is None else np.array(light.up)
+        turn = np.degrees(np.arctan2(-(own_up @ place.right), own_up @ place.up))
         found.append(
             Placement(
                 designator=f"D{number + 1}",
@@ -75,6 +80,7 @@ def placements(design: SensorDesign) -> list[Placement]:
                 board=place.board,
                 layer="bottom" if place.bottom else "top",
                 on_board=(float(position @ place.right), float(position @ place.up)),
+                turn_on_board=float(turn % 360.0),
                 colour=group.colour,
                 flux=group.flux,
             )
@@ -118,13 +124,9 @@ def placement_csv(placed: Sequence[Placement]) -> str:
             led.designator,
             *(digits(value, 4) for value in led.position),
             *(digits(value, 6) for value in led.direction),
-            digits(led.rotation, 3),
-            led.board,
-            led.layer,
+            *(digits(led.rotation, 3), led.board, led.layer),
             *(digits(value, 4) for value in led.on_board),
-            led.model,
-            led.part,
-            led.group,
+            *(led.model, led.part, led.group),
             *(f"{value:g}" for value in led.colour),
             f"{led.flux:g}",
         ]

@@ -24,16 +24,12 @@ less than 0.002 degrees to one another are one plane.
 def thickened(mesh: TriangleMesh, thickness: float) -> TriangleMesh | None:
     """Return the plate behind a sheet, or None if the plate is not closed.
 
-    The sheet stays the plate's near face, to which its normals point. The far face is parallel to
-    it, mitred at edges. Pieces that meet in an edge of more than two faces are made one by one and
-    joined.
-
-    Args:
-        mesh: open mesh, with coincident corners as one vertex.
-        thickness: thickness, mm.
+    The sheet, a welded open mesh, stays the plate's near face, to which its normals point. The far
+    face is parallel to it, mitred at edges. Pieces that meet in an edge of more than two faces are
+    made one by one and joined.
     """
-    plates = [_plate(mesh.with_faces(mesh.faces[piece]).compacted(), thickness)
-              for piece in _pieces(mesh)]  # fmt: skip
+    pieces = [mesh.with_faces(mesh.faces[piece]).compacted() for piece in _pieces(mesh)]
+    plates = [body_between(each, each.vertices + _offsets(each, thickness)) for each in pieces]
     if len(plates) == 1:
         return plates[0] if plates[0].is_closed and plates[0].volume > 0.0 else None
     solids = [as_manifold(plate) for plate in plates]
@@ -68,17 +64,9 @@ def _edges(mesh: TriangleMesh) -> tuple[NDArray[np.int32], NDArray[np.int64], ND
     return sides, np.asarray(edge).reshape(-1), counts
 
 
-def _plate(mesh: TriangleMesh, thickness: float) -> TriangleMesh:
-    """Return the closed plate of one piece."""
-    return body_between(mesh, mesh.vertices + _offsets(mesh, thickness))
-
-
 def body_between(mesh: TriangleMesh, far: FloatArray) -> TriangleMesh:
-    """Return the closed body between a sheet and a copy of it behind its faces.
-
-    Args:
-        mesh: a welded sheet, mm.
-        far: vertices (n, 3) of the copy, mm.
+    """Return the closed body between a welded sheet and a copy of it, with vertices (n, 3), mm,
+    behind its faces.
     """
     count = len(mesh.vertices)
     ends, inverse, counts = _edges(mesh)
