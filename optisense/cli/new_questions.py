@@ -32,9 +32,8 @@ from optisense.geometry import TriangleMesh
 from optisense.length_units import MM_PER, Units
 from optisense.sensors.from_meshes import guessing
 from optisense.sensors.from_meshes.building import USUAL_MATERIAL
-from optisense.sensors.from_meshes.cad_bodies import CadBody, Use
 from optisense.sensors.from_meshes.directions import SIDES
-from optisense.sensors.from_meshes.files import largest_dimension, likely_units
+from optisense.sensors.from_meshes.files import CadBody, Use, largest_dimension, likely_units
 from optisense.sensors.from_meshes.fingertips import is_round
 from optisense.sensors.from_meshes.recipe import CameraChoice, Recipe
 from optisense.sensors.from_meshes.recipe_lights import LightChoice

@@ -8,6 +8,7 @@ import shapely
 from optisense.array_types import FloatArray
 from optisense.design import Light
 from optisense.design.limits import refuse_far
+from optisense.design.posing import triple
 from optisense.errors import ContactError, DesignError
 from optisense.geometry import SensingSurface, TriangleMesh, ray_hits
 from optisense.geometry.patches import Faces, mean_normal, middle
@@ -22,11 +23,7 @@ SPREAD = 0.2
 
 
 def row(choice: LightRow, bounds: FloatArray) -> list[Light]:
-    """Return lights along one side of a box, centred on the side.
-
-    Args:
-        bounds: lower and upper corner, (2, 3) mm.
-    """
+    """Return lights along one side of a box (2, 3), mm, centred on the side."""
     across, sign = axis_of(choice.side)
     along = axis_along(choice, bounds)
     size = bounds[1] - bounds[0]
@@ -63,13 +60,11 @@ def axis_along(choice: LightRow, bounds: FloatArray) -> int:
 
 
 def ring(choice: Ring, bounds: FloatArray) -> list[Light]:
-    """Return lights in a circle, or evenly over an arc with one at each end.
+    """Return lights in a circle around a part with bounds (2, 3), mm, or evenly over an arc with
+    one at each end.
 
     Angles count from the axis after the circle's own (x, y, z, x ...), anticlockwise seen from the
     direction of the axis.
-
-    Args:
-        bounds: bounds of the part, (2, 3) mm.
     """
     axis, sign = axis_of(choice.axis)
     first, second = np.eye(3)[(axis + 1) % 3], sign * np.eye(3)[(axis + 2) % 3]
@@ -98,11 +93,6 @@ def over(choice: LightsOver, mesh: TriangleMesh, patches: list[Faces], where: st
 
     A grid follows the longer side of the surface's outline; on a curved surface its pitch is, and
     without one the available length, measured along the surface.
-
-    Args:
-        mesh: reference surface, welded, mm.
-        patches: chosen faces, by patch.
-        where: name for messages.
 
     Raises:
         DesignError: lights fall off the surface, or its normals point in all directions.
@@ -139,12 +129,9 @@ def light(place: FloatArray, way: FloatArray, up: FloatArray) -> Light:
         DesignError: the place is more than a metre from the origin.
     """
     refuse_far("a light", place)
-    clean = [np.round(v, 6) + 0.0 for v in (place, way, up)]
-    (px, py, pz), (dx, dy, dz), (ux, uy, uz) = (v.tolist() for v in clean)
+    position, direction, upward = (triple(np.round(v, 6) + 0.0) for v in (place, way, up))
     parallel = np.linalg.norm(np.cross(way, up)) < 1e-6
-    return Light(
-        position=(px, py, pz), direction=(dx, dy, dz), up=None if parallel else (ux, uy, uz)
-    )
+    return Light(position=position, direction=direction, up=None if parallel else upward)
 
 
 def _direction(given: Direction, normal: FloatArray) -> FloatArray:

@@ -68,11 +68,6 @@ def laid_on(mesh: TriangleMesh, below: TriangleMesh, part: PartChoice) -> Triang
     Its flat face there (or its outermost points) meets that of the other part, at a distance of
     `gap` mm. In the plane of the side, the middles of the two faces agree, or their ends if `flush`
     names a side. `move` is added to this.
-
-    Args:
-        mesh: mesh of the part, mm, mirrored and turned.
-        below: mesh of the other part, mm.
-        part: choice of the recipe, with side, gap and flush sides.
     """
     axis, sign = axis_of(part.side or "+z")
     own, other = _end(mesh, axis, -sign), _end(below, axis, sign)

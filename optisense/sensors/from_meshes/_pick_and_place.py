@@ -68,9 +68,8 @@ def read_pick_and_place(
 ) -> tuple[dict[str, BoardPart], list[str]]:
     """Return the parts of a pick-and-place file, by designator, and notes on columns that it lacks.
 
-    Args:
-        path: table with commas, semicolons, tabs or blanks, as UTF-8 or UTF-16.
-        units: unit of its lengths, if the file does not state it.
+    It is a table with commas, semicolons, tabs or blanks, as UTF-8 or UTF-16. Units are those of
+    its lengths if it does not state them.
 
     Raises:
         DesignError: the file is missing, lacks the columns or its unit, or has positions in space;

@@ -6,23 +6,43 @@ import numpy as np
 from pydantic import ValidationError
 
 from optisense import library
+from optisense.array_types import FloatArray
 from optisense.design import Camera, LightGroup, Provenance, Role, SensorDesign, Status
 from optisense.design.camera_checks import LEAST_PICTURE, view_shares
 from optisense.design.colour import NAMED_COLOURS
+from optisense.design.limits import refuse_far
+from optisense.design.posing import triple
 from optisense.design.problems import design_error
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import inside
-from optisense.geometry.patches import middle
+from optisense.geometry.patches import mean_normal, middle
 from optisense.sensors.from_meshes import _lights as light_placement
 from optisense.sensors.from_meshes import _strips
-from optisense.sensors.from_meshes._camera import make_camera
 from optisense.sensors.from_meshes._pick_and_place import read_pick_and_place
 from optisense.sensors.from_meshes._recipe_state import RecipeState
 from optisense.sensors.from_meshes._touching import refuse_contact_with_lamps
+from optisense.sensors.from_meshes.directions import vector
+from optisense.sensors.from_meshes.recipe import CameraChoice
 from optisense.sensors.from_meshes.recipe_lights import USUAL_FLUX, LightChoice, LightRow
 from optisense.sensors.from_meshes.recipe_parts import ShapeReference
 from optisense.sensors.from_meshes.surfaces import chosen, pick
+
+WIDTH = 320
+"""Width of a picture if the recipe gives no resolution, pixels; the height follows the camera."""
+
+WIDEST_FIT = 100.0
+"""Largest field of view that is used to place a camera, degrees: a wider camera is placed as if it
+saw this much, so that its rim is not needed.
+"""
+
+CLEARANCE = 1.0
+"""Distance that an automatically placed camera keeps from the parts in front of it, mm."""
+
+LARGEST_STEP_BACK = 200.0
+"""Largest distance that an automatically placed camera steps back in search of a view, mm; no
+tactile sensor is longer.
+"""
 
 LITTLE_SEEN = 0.5
 """Share of the area of the sensing surface that the camera sees below which `new` notes it. The
@@ -33,11 +53,8 @@ been placed is easily moved.
 
 
 def place_lights(state: RecipeState, name: str, choice: LightChoice) -> LightGroup:
-    """Return a light group with the positions of its lights.
-
-    Args:
-        state: recipe and meshes; notes and sources are added to it.
-        choice: model, colour and placement of the lights.
+    """Return a light group with the positions of its lights; notes and sources are added to the
+    state.
 
     Raises:
         DesignError: a light falls off its surface, or a row or ring is impossible.
@@ -74,12 +91,7 @@ def place_lights(state: RecipeState, name: str, choice: LightChoice) -> LightGro
     shares = NAMED_COLOURS[colour] if isinstance(colour, str) else colour
     flux, state.provenance[f"lights.{name}.flux"] = _flux(choice, shares)
     try:
-        group = LightGroup(
-            model=choice.model,
-            colour=shares,
-            flux=flux,
-            lights=lights,
-        )
+        group = LightGroup(model=choice.model, colour=shares, flux=flux, lights=lights)
     except ValidationError as error:
         raise design_error(error, {}, where=where, model=LightGroup) from None
     if choice.row is not None:
@@ -157,6 +169,102 @@ def place_camera(state: RecipeState) -> Camera:
         raise design_error(error, {}, where=where, model=Camera) from None
 
 
+def make_camera(
+    choice: CameraChoice,
+    skin: TriangleMesh,
+    place: FloatArray | None,
+    target: FloatArray,
+    parts: dict[str, TriangleMesh],
+) -> Camera:
+    """Return the camera of a design with its pupil at a place (3,), mm, or outside of all parts
+    where the skin fills the picture; unless its choice has a direction, it looks at a target (3,),
+    mm.
+
+    Raises:
+        LibraryError: there is no such camera.
+        DesignError: the camera looks at its own position, `up` is the viewing direction, or the
+            camera is more than a metre from the origin.
+    """
+    model = library.camera(choice.model)
+    width, height = choice.resolution or model.size_at(WIDTH)
+    fov = model.fov if choice.fov is None else choice.fov
+    if place is None:
+        way = mean_normal(skin)
+        if choice.direction is not None:
+            way = -vector(choice.direction)
+        if np.linalg.norm(way) < 1e-3:
+            raise DesignError(
+                "the sensing surface faces all sides, so a place for the camera can't be derived",
+                where="camera",
+                hint="Give the position of the camera: at: [x, y, z]",
+            )
+        way = way / np.linalg.norm(way)
+        up = upward(choice, -way)
+        place = _behind(skin, target, way, up, fov, width / height, parts)
+    look = vector(choice.direction) if choice.direction is not None else target - place
+    distance = float(np.linalg.norm(look))
+    if distance < 1e-6:
+        raise DesignError(
+            "the camera is at the point that it looks at",
+            where="camera",
+            hint="Change at, the position, or look_at, the target",
+        )
+    look = look / distance
+    up = upward(choice, look)
+    if np.linalg.norm(np.cross(look, up)) < 1e-3:
+        raise DesignError(
+            "the viewing direction of the camera is parallel to up",
+            where="camera.up",
+            hint="Choose an up that points to the top of the picture",
+        )
+    refuse_far("the camera", place)
+    return Camera(
+        model=choice.model,
+        projection=choice.projection or model.projection,
+        fov=fov,
+        resolution=(width, height),
+        position=triple(np.round(place, 6) + 0.0),
+        direction=triple(np.round(look, 9) + 0.0),
+        up=triple(up + 0.0),
+    )
+
+
+def upward(choice: CameraChoice, look: FloatArray) -> FloatArray:
+    """Return the direction to the picture's top: as chosen, else +y, or +z when looking along y."""
+    if choice.up is not None:
+        return vector(choice.up)
+    y, z = np.eye(3)[1], np.eye(3)[2]
+    return y if abs(look @ y) < 0.7 else z
+
+
+def _behind(
+    skin: TriangleMesh,
+    target: FloatArray,
+    way: FloatArray,
+    up: FloatArray,
+    fov: float,
+    aspect: float,
+    parts: dict[str, TriangleMesh],
+) -> FloatArray:
+    """Return the nearest position along `way` from the target from which all of the skin is in the
+    picture, outside of all parts.
+    """
+    right = np.cross(-way, up)
+    right /= np.linalg.norm(right)
+    top = np.cross(right, -way)
+    wide = np.tan(np.radians(min(fov, WIDEST_FIT)) / 2.0)
+    points = skin.vertices - target
+    ahead = -points @ way
+    needed = np.maximum(np.abs(points @ right) / wide, np.abs(points @ top) * aspect / wide)
+    distance = float((needed - ahead).max())
+    for step in np.arange(0.0, LARGEST_STEP_BACK, 0.5):
+        place = target + (distance + step) * way
+        probes = np.array([place, place + CLEARANCE * way, place - CLEARANCE * way])
+        if not any(m.is_closed and inside(probes, m).any() for m in parts.values()):
+            return place
+    return np.asarray(target + distance * way)
+
+
 def view_note(design: SensorDesign) -> str | None:
     """Return a note if the camera of a finished design sees little of the sensing surface, or from
     afar; refraction is ignored, and designs with mirrors are not judged.
@@ -180,11 +288,7 @@ def view_note(design: SensorDesign) -> str | None:
 
 
 def check_places(state: RecipeState, camera: Camera, groups: dict[str, LightGroup]) -> None:
-    """Check that neither the camera nor a light lies in a face, and note those inside solids.
-
-    Raises:
-        DesignError: a camera or light lies in a face.
-    """
+    """Raise DesignError if the camera or a light lies in a face, and note those inside solids."""
     places = [("the camera", np.array(camera.position))]
     for name, group in groups.items():
         for number, light in enumerate(group.lights):

@@ -33,11 +33,7 @@ class RecipeState:
         self.notes: list[str] = []
 
     def load(self, shape: ShapeReference, where: str) -> TriangleMesh:
-        """Return the mesh of a file in its final position, mm.
-
-        Args:
-            shape: shape that comes from a file.
-            where: name of the shape for messages.
+        """Return the mesh of a file in its final position, mm; `where` names it in messages.
 
         Raises:
             SetupError: the file is a STEP file, but the extra for it is missing.
@@ -53,14 +49,8 @@ class RecipeState:
             raise MeshError(error.message, where=place, hint=error.hint) from None
 
     def check_known(self, kind: str, name: str, *path: str) -> None:
-        """Check that the library has an entry.
-
-        Args:
-            kind: kind of the entry, such as 'light'.
-            path: path of the name in the recipe, whose line the error states.
-
-        Raises:
-            LibraryError: the library has no such entry.
+        """Raise LibraryError with the line of a path in the recipe if the library has no entry of a
+        kind, such as 'light', and name.
         """
         try:
             library.entry(kind, name)

@@ -30,9 +30,6 @@ MISFIT = 0.2
 def along(choice: LightsAlong, mesh: TriangleMesh) -> list[Light]:
     """Return lights along the outline of a part, cut across an axis.
 
-    Args:
-        mesh: mesh of the part, closed, mm.
-
     Raises:
         DesignError: the part does not reach this height.
     """
@@ -108,10 +105,7 @@ def _round(one: FloatArray, other: FloatArray) -> bool:
 
 
 def from_table(choice: FromTable, table: dict[str, BoardPart]) -> list[Light]:
-    """Return the lights of a pick-and-place file.
-
-    Args:
-        choice: choice of parts, and the position of the board in the sensor.
+    """Return the lights of a pick-and-place file at the position of its board in the sensor.
 
     Raises:
         DesignError: there is no such designator, or the points do not fit the file.

@@ -14,6 +14,7 @@ from optisense.geometry import TriangleMesh
 from optisense.geometry.coincidence import cut, find_coincident
 from optisense.geometry.joining import EXACT, join, touching_area
 from optisense.geometry.overlaps import find_overlap
+from optisense.geometry.mesh_points import distance_within
 from optisense.geometry.solids import as_manifold
 from optisense.sensors.from_meshes.recipe import Recipe
 
@@ -46,10 +47,7 @@ def settle_contacts(recipe: Recipe, meshes: dict[str, TriangleMesh]) -> Contacts
     """Join transparent solids that nearly touch, and rank those that overlap.
 
     Of two solids the softer one is changed, or else the later one of the recipe. Pairs in
-    `air_films` keep their gap.
-
-    Args:
-        meshes: meshes of all parts that are solids of their own, by name, mm, closed, welded.
+    `air_films` keep their gap. The meshes are closed and welded.
     """
     order = [
         name
@@ -125,15 +123,8 @@ def _only_joined(mover: TriangleMesh, fixed: TriangleMesh, distance: float) -> b
 def lay_on_elastomer(
     name: str, skin: TriangleMesh, elastomers: dict[str, TriangleMesh], distance: float
 ) -> tuple[TriangleMesh, list[str]]:
-    """Return a sensing surface on the faces of the elastomer that it lies on.
-
-    Args:
-        skin: mesh of the skin, mm.
-        elastomers: meshes of the elastomers, by name.
-        distance: largest distance to the elastomer, mm.
-
-    Returns:
-        The mesh, whose normals may point either way, and notes on the changes.
+    """Return a sensing surface on the faces of the elastomer that it lies on, to a distance (mm),
+    and notes on the changes; its normals may point either way.
     """
     notes: list[str] = []
     for gel_name, gel in elastomers.items():
@@ -181,24 +172,12 @@ def look_inward(
 def refuse_contact_with_lamps(
     places: list[tuple[str, np.ndarray]], meshes: dict[str, TriangleMesh]
 ) -> None:
-    """Check that no light and no camera lies in a face of a part, where its side would be
-    undefined.
-
-    Args:
-        places: names for messages, and positions (3,), mm.
-
-    Raises:
-        DesignError: a light or camera lies in a face.
+    """Raise DesignError if a light or a camera, given by its name for messages and its position
+    (3,), mm, lies in a face of a part, where its side would be undefined.
     """
-    from optisense.geometry.mesh_points import closest_points
-
     for label, place in places:
         for name, mesh in meshes.items():
-            low, high = mesh.bounds[0] - EXACT, mesh.bounds[1] + EXACT
-            if not ((place >= low) & (place <= high)).all():
-                continue
-            near = np.linalg.norm(closest_points(mesh, place) - place, axis=1).min()
-            if near < EXACT:
+            if distance_within(mesh, place, EXACT) < EXACT:
                 at = "({:.3f}, {:.3f}, {:.3f})".format(*place)
                 raise DesignError(
                     f"{label} at {at} mm lies in a face of part '{name}'",

@@ -1,20 +1,25 @@
-"""CAD files as meshes in millimetres, each read once, and a check of their units."""
+"""CAD files as meshes in millimetres, each read once, with the uses of their bodies and a check of
+their units.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
+from optisense.design import Role
 from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.mesh_files import FORMATS
 from optisense.geometry.step import SUFFIXES as STEP_FORMATS
 from optisense.geometry.step import read_step
-from optisense.length_units import MM_PER
+from optisense.length_units import MM_PER, Units
 from optisense.near import near_match
+from optisense.sensors.from_meshes.directions import nearest_side
 from optisense.sensors.from_meshes.recipe_parts import ShapeReference
 from optisense.text import brief
 from optisense.untrusted_files import is_file, is_folder
@@ -37,6 +42,10 @@ it may be in another unit.
 
 COMMON_UNITS = tuple(unit for unit in MM_PER if unit != "mil")
 """Units that are guessed; boards are drawn in mils, but hardly any shape is exported in them."""
+
+
+Use = Role | Literal["lights", "camera", "nothing"]
+"""Use of a body: a part of some role, a reference for lights or the camera, or none."""
 
 
 @dataclass(frozen=True)
@@ -271,3 +280,64 @@ def _odd_parts(meshes: dict[str, TriangleMesh], scale: float, gels: Collection[s
             f"is in another unit, give it its own {unit}"
         )
     return notes
+
+
+@dataclass(frozen=True)
+class CadBody:
+    """Body in the user's CAD files.
+
+    Attributes:
+        name: name for a part of the design, made of the body's or file's name.
+        file: path of the file from the folder of the recipe.
+        body: body that was read; its mesh is in the file's own units.
+        use: probable use.
+        copies: further lights of its name on the same side of the gel, which count as one with it.
+    """
+
+    name: str
+    file: str
+    body: Body
+    use: Use
+    copies: tuple[Body, ...] = ()
+
+    @property
+    def solid(self) -> str | list[str] | None:
+        """Name of the body in a STEP file, or names of it and its copies."""
+        names = [each.name for each in (self.body, *self.copies) if each.name is not None]
+        return names if self.copies else self.body.name
+
+    @property
+    def shape(self) -> ShapeReference:
+        """Reference to the body in a recipe."""
+        return ShapeReference(file=self.file, solid=self.solid)
+
+    def mesh(self, units: Units | None) -> TriangleMesh:
+        """Return its mesh in mm; `units` is that of files that don't state theirs (mm if None)."""
+        if self.body.own_units:
+            return joined((self.body, *self.copies))
+        scale = MM_PER[units or "mm"]
+        return self.body.mesh.with_vertices(scale * self.body.mesh.vertices)
+
+
+def with_copies(found: list[CadBody]) -> list[CadBody]:
+    """Return the bodies, with lights of one kind on one side of the gel taken together."""
+    carrier = carrier_of({each.name: each.use for each in found})
+    gel = next((each.body.mesh.bounds for each in found if each.name == carrier), np.zeros((2, 3)))
+    groups: dict[tuple[object, ...], CadBody] = {}
+    for each in found:
+        key: tuple[object, ...] = (each.name,)
+        if each.use == "lights" and each.body.kind is not None:
+            side = nearest_side((gel - each.body.mesh.bounds).mean(axis=0))
+            key = (each.file, each.body.kind, side)
+        first = groups.setdefault(key, each)
+        if first is not each:
+            groups[key] = replace(first, copies=(*first.copies, each.body))
+    return list(groups.values())
+
+
+def carrier_of(uses: Mapping[str, Use]) -> str | None:
+    """Return the name of the body that carries the coating: the first gel, else the first support,
+    else the sensing surface itself; None if there is none of them.
+    """
+    roles = (Role.ELASTOMER, Role.SUPPORT, Role.SENSING_SURFACE)
+    return next((name for role in roles for name, use in uses.items() if use is role), None)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
+from optisense.design.posing import triple
 from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import inside
 from optisense.geometry.patches import faces_towards, smoothly_joined
@@ -107,18 +107,16 @@ def lights_and_camera(
     count = 1 + int(np.radians(arc) * radius / LED_PITCH)
     lights = {}
     for number, colour in enumerate(("red", "green", "blue")):
-        ring: dict[str, Any] = {
-            "part": clear[0],
-            "axis": outward,
-            "count": count,
-            "radius": radius,
-            "height": round(float(centre[axis]), 3),
-            "start": 120.0 * number,
-            "end": 120.0 * number + arc,
-            "direction": outward,
-        }
-        lights[colour] = LightChoice(
-            model=light, colour=colour, flux=flux, ring=Ring.model_validate(ring)
+        ring = Ring(
+            part=clear[0],
+            axis=outward,
+            count=count,
+            radius=radius,
+            height=round(float(centre[axis]), 3),
+            start=120.0 * number,
+            end=120.0 * number + arc,
+            direction=outward,
         )
-    x, y, z = np.round(pupil, 3).tolist()
-    return lights, CameraChoice(model=FISHEYE, at=(x, y, z), direction=outward)
+        lights[colour] = LightChoice(model=light, colour=colour, flux=flux, ring=ring)
+    at = triple(np.round(pupil, 3))
+    return lights, CameraChoice(model=FISHEYE, at=at, direction=outward)

@@ -21,14 +21,17 @@ from optisense.geometry.joining import touching_area
 from optisense.geometry.patches import faces_towards
 from optisense.length_units import Units
 from optisense.sensors._led_flux import balanced_flux
-from optisense.sensors.from_meshes.cad_bodies import CadBody, Use, carrier_of, with_copies
 from optisense.sensors.from_meshes.directions import SIDES, nearest_side, vector
 from optisense.sensors.from_meshes.files import (
     ALL_FORMATS,
+    CadBody,
     CadFiles,
+    Use,
+    carrier_of,
     largest_dimension,
     likely_units,
     obj_objects,
+    with_copies,
 )
 from optisense.sensors.from_meshes.fingertips import LED_PITCH, is_round, lights_and_camera
 from optisense.sensors.from_meshes.recipe import CameraChoice, Recipe

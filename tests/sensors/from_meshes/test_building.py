@@ -29,7 +29,7 @@ from optisense.sensors.from_meshes import (
     read_recipe,
     save_recipe,
 )
-from optisense.sensors.from_meshes.cad_bodies import Use
+from optisense.sensors.from_meshes.files import Use
 from optisense.sensors.from_meshes.guessing import guess_use
 from optisense.workshop import export
 

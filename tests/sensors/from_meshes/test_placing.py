@@ -13,8 +13,8 @@ from optisense.design.camera_checks import lens_problems
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.mesh import grid_faces
-from optisense.sensors.from_meshes._camera import make_camera
 from optisense.sensors.from_meshes._lights import over, ring, row
+from optisense.sensors.from_meshes._placement import make_camera
 from optisense.sensors.from_meshes.recipe import CameraChoice
 from optisense.sensors.from_meshes.recipe_lights import LightRow, LightsOver, Ring
 from optisense.sensors.from_meshes.surfaces import pick
