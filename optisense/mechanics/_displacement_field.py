@@ -160,9 +160,8 @@ class DisplacementField:
         """Return the displacement (2, n), mm, along x and y at points of the tangent plane, from
         splines on the fine and on the coarse grid and those of the effect of the gel's shape.
         """
-        result = np.concatenate(
-            [self._read(x, y, *(both[k].value for both in splines_of_grids)) for k in (0, 1)]
-        )
+        fine, coarse = splines_of_grids
+        result = np.concatenate([self._read(x, y, fine[k].value, coarse[k].value) for k in (0, 1)])
         if beyond is not None:
             known = beyond[0].holds(x, y)
             result[:, known] += [spline.value(x[known], y[known]) for spline in beyond]

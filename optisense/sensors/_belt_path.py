@@ -53,13 +53,11 @@ class BeltHalf:
         return self.points + height * self.normals
 
     def wheel(self, number: int, gap: float, tessellation: float) -> FloatArray:
-        """Return the outline of the wheel of a bend, (k, 2) mm, counter-clockwise.
+        """Return the outline of the wheel of a bend, (k, 2) mm, counter-clockwise, with pieces of
+        about `tessellation` mm.
 
-        Args:
-            number: number of the bend.
-            gap: distance between belt and wheel, mm; the same everywhere, as the wheel has its
-                corners below those of the belt.
-            tessellation: approximate length of a piece, mm.
+        The gap (mm) between belt and wheel is the same everywhere, as the wheel has its corners
+        below those of the belt.
         """
         beside = self.raised(-gap)[self.starts[number] : self.starts[number + 1] + 1][::-1]
         centre = self.bends[number]
@@ -71,12 +69,8 @@ class BeltHalf:
 
 
 def trace(pieces: Sequence[Straight | Bend], level: float, tessellation: float) -> BeltHalf:
-    """Return the inner face of a belt along its runs and bends.
-
-    Args:
-        pieces: runs and bends, in their order along the belt.
-        level: z of the inner face at x = 0, where the belt runs along +x, mm.
-        tessellation: approximate length of a piece, mm.
+    """Return the inner face of a belt along its runs and bends, in pieces of about `tessellation`
+    mm; at x = 0, where it runs along +x, its z is `level`, mm.
     """
     place, angle = np.array([0.0, level]), 0.0
     points, normals, starts, bends = [place[None]], [_normal(angle)[None]], [0], {}
@@ -106,25 +100,17 @@ def trace(pieces: Sequence[Straight | Bend], level: float, tessellation: float) 
 
 
 def mirrored_and_joined(left: FloatArray, right: FloatArray) -> FloatArray:
-    """Return one curve (k, 2) from left to right, made of two halves (n, 2) that begin at x = 0.
-
-    Args:
-        left: left half, mirrored to the right, mm.
-        right: right half, mm.
+    """Return one curve (k, 2), mm, from left to right, made of two halves (n, 2) that begin at x =
+    0 and of which the left one is mirrored to the right.
     """
     return np.concatenate([left[:0:-1] * (-1.0, 1.0), right])
 
 
 def way_back(left: BeltHalf, right: BeltHalf) -> tuple[float, float]:
-    """Return the lengths of a belt that closes behind its two wheels, which turn it by a quarter
-    each before.
+    """Return the length of the inner face that is modelled, and of the straight run in which the
+    belt closes behind its two wheels, mm; each half is given as if it lay on the right.
 
-    Args:
-        left: left half, as if it lay on the right.
-
-    Returns:
-        Length of the inner face that is modelled, and of the straight run of the return, mm; this
-        run and half a turn around a wheel are not modelled.
+    This run, and half a turn around a wheel, are not modelled.
     """
     (x0, z0), (x1, z1) = left.bends[max(left.bends)], right.bends[max(right.bends)]
     drawn = sum(

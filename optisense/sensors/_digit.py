@@ -18,7 +18,6 @@ from optisense import library
 from optisense.array_types import FloatArray
 from optisense.design import (
     Cage,
-    Camera,
     FaceFinish,
     Light,
     LightGroup,
@@ -31,6 +30,7 @@ from optisense.geometry import TriangleMesh
 from optisense.sensors._digit_sources import provenance
 from optisense.sensors._half_round import HalfRound, stacked
 from optisense.sensors._led_flux import balanced_flux
+from optisense.sensors._shapes import axial_camera
 from optisense.sensors.dimensions import (
     Dimensions,
     Length,
@@ -156,7 +156,6 @@ def digit(size: DigitDimensions) -> SensorDesign:
     )
     flux = balanced_flux(LED) if size.led_flux is None else size.led_flux
     lamp_z = window_bottom + size.led_height
-    # The camera looks along +z with +y up, so the right of the picture is -x.
     places = {"red": size.led_pitch, "green": -size.led_pitch, "blue": 0.0}
     design = SensorDesign(
         name=NAME,
@@ -178,14 +177,7 @@ def digit(size: DigitDimensions) -> SensorDesign:
             name: _led(edge, places[name], size.led_gap, lamp_z, NAMED_COLOURS[name], flux)
             for name in places
         },
-        camera=Camera(
-            model=CAMERA,
-            fov=size.fov,
-            resolution=size.resolution,
-            position=(0.0, 0.0, -size.pupil_distance),
-            direction=(0.0, 0.0, 1.0),
-            up=(0.0, 1.0, 0.0),
-        ),
+        camera=axial_camera(CAMERA, size.fov, size.resolution, -size.pupil_distance),
         provenance=provenance(SIDES if size.edge_roughness else ()),
     )
     gel = _gel(
@@ -294,10 +286,8 @@ def _gel(
 
     The dome rises with the square of the distance from its rim towards the middle. The rounded edge
     is a parabola that begins vertical at the wall and meets the dome at the dome's mean slope, so
-    all corners lie in horizontal rings.
-
-    Args:
-        heights: height of the whole gel, its wall and its dome, and inset of the edge, mm.
+    all corners lie in horizontal rings. `heights` are those of the whole gel, its wall and its
+    dome, and the inset of the edge, mm.
     """
     thickness, wall, rise, inset = heights
     rim_z = -rise
@@ -343,10 +333,8 @@ def _coated(gel: TriangleMesh) -> TriangleMesh:
 def _housing(
     gel: HalfRound, edge: HalfRound, levels: tuple[float, float, float], tessellation: float
 ) -> TriangleMesh:
-    """Return a tub with an opening for the gel in its roof, closed behind the camera.
-
-    Args:
-        levels: z of the roof's underside, of its top, and of the camera's pupil, mm.
+    """Return a tub with an opening for the gel in its roof, closed behind the camera; its levels
+    (mm) are z of the roof's underside, of its top, and of the camera's pupil.
     """
     roof, top, pupil = levels
     floor = pupil - BEHIND_PUPIL

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from optisense import library
 from optisense.design import (
     Absorber,
-    Camera,
     Dielectric,
     LightGroup,
     Part,
@@ -44,9 +43,9 @@ from optisense.sensors._gelbelt_checks import (
     check_numbers,
     check_wheels,
 )
-from optisense.sensors._gelbelt_sources import OmittedReturn, gelbelt_sources
+from optisense.sensors._gelbelt_sources import gelbelt_sources
 from optisense.sensors._led_flux import nominal_flux
-from optisense.sensors._shapes import ribbon, rod, row_of_lights, strip
+from optisense.sensors._shapes import axial_camera, ribbon, rod, row_of_lights, strip
 from optisense.sensors.dimensions import (
     Dimensions,
     Length,
@@ -176,6 +175,7 @@ def gelbelt(size: GelBeltDimensions) -> SensorDesign:
         (size.reflectance, size.specularity),
         led_flux,
     )
+    layers = size.tape_thickness, size.gel_thickness
     level = -size.gel_thickness - size.tape_thickness
     window_top = level - size.film_thickness
     window_bottom = window_top - size.window_thickness
@@ -221,7 +221,6 @@ def gelbelt(size: GelBeltDimensions) -> SensorDesign:
     check_green(left, (x, z))
     row, side = (size.leds_per_group, size.led_pitch), half[1] + size.led_gap
     rows = {
-        # The camera looks along +z with +y up, so the right of the picture is -x.
         "red": row_of_lights((0.0, side, middle), ALONG_X, *row, (0.0, -1.0, 0.0)),
         "green": row_of_lights((-x, 0.0, z), ALONG_Y, *row, (-dx, 0.0, dz)),
         "blue": row_of_lights((0.0, -side, middle), ALONG_X, *row, (0.0, 1.0, 0.0)),
@@ -258,23 +257,13 @@ def gelbelt(size: GelBeltDimensions) -> SensorDesign:
             name: LightGroup(model=LED, colour=NAMED_COLOURS[name], flux=flux, lights=lights)
             for (name, lights), flux in zip(rows.items(), led_flux, strict=True)
         },
-        camera=Camera(
-            model="pi-v2",
-            fov=size.fov,
-            resolution=size.resolution,
-            position=(0.0, 0.0, -size.pupil_distance),
-            direction=(0.0, 0.0, 1.0),
-            up=(0.0, 1.0, 0.0),
-        ),
+        camera=axial_camera("pi-v2", size.fov, size.resolution, -size.pupil_distance),
         provenance=gelbelt_sources(
-            size.light_design,
-            _left_out(
-                left, plain, size.wheel_radius, (size.tape_thickness, size.gel_thickness), half[1]
-            ),
+            size.light_design, *way_back(left, plain), size.wheel_radius, layers, 2.0 * half[1]
         ),
     )
     design.meshes.update(
-        _belt(left, plain, (size.tape_thickness, size.gel_thickness), half[1], size.tessellation),
+        _belt(left, plain, layers, half[1], size.tessellation),
         window=TriangleMesh.box((-half[0], -half[1], window_bottom), (*half, window_top)),
         wheels=_wheels(
             left, plain, max(size.film_thickness, WHEEL_GAP), half[1], size.tessellation
@@ -287,22 +276,6 @@ def gelbelt(size: GelBeltDimensions) -> SensorDesign:
         del design.provenance["parts.film"], design.provenance[f"materials.{FILM}.ior"]
     size.describe(design, ("light_design",))
     return design
-
-
-def _left_out(
-    left: BeltHalf, right: BeltHalf, radius: float, layers: tuple[float, float], half_width: float
-) -> OmittedReturn:
-    """Return the return path of the belt, which no light reaches and which is not modelled."""
-    tape, gel = layers
-    drawn, run = way_back(left, right)
-    inner, outer = radius + tape, radius + tape + gel
-    half_turn = 0.5 * math.pi * (outer**2 - inner**2)
-    return OmittedReturn(
-        length=math.pi * radius + run,
-        whole=drawn + math.pi * radius + run,
-        gel=2.0 * half_width * (half_turn + gel * run),
-        coat=2.0 * half_width * (math.pi * outer + run),
-    )
 
 
 def _aimed(
@@ -322,12 +295,8 @@ def _belt(
     half_width: float,
     tessellation: float,
 ) -> dict[str, TriangleMesh]:
-    """Return tape, gel and coating on common points; the skin is the part of the coat that is on no
-    wheel.
-
-    Args:
-        left: left half, as if it lay on the right.
-        layers: thickness of tape and gel, mm.
+    """Return tape, gel and coating on common points, of layers with the thickness (mm) of tape and
+    gel; the skin is the part of the coat that is on no wheel.
     """
     tape, gel = layers
     inner, middle, outer = (

@@ -2,32 +2,36 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
 
 from optisense.design import Provenance, Status
 from optisense.sensors._sources import XP565, provenance_of
 
 
-@dataclass(frozen=True)
-class OmittedReturn:
-    """Part of a belt that is not modelled: its return behind the wheels.
+def gelbelt_sources(
+    light_design: int,
+    drawn: float,
+    run: float,
+    radius: float,
+    layers: tuple[float, float],
+    width: float,
+) -> dict[str, Provenance]:
+    """Return the provenance of a GelBelt with one of its light designs.
 
-    Attributes:
-        length: length along the inner face, mm.
-        whole: length of the whole inner face, mm.
-        gel: volume of its gel, mm^3.
-        coat: area of its outer face, mm^2.
+    No light reaches the return of the belt, which is not modelled: half a turn around a wheel with
+    a radius (mm), and a straight run.
+
+    Args:
+        drawn, run: lengths of the modelled inner face and of that run, mm.
+        layers: thickness of tape and gel, mm.
+        width: width of the belt, mm.
     """
-
-    length: float
-    whole: float
-    gel: float
-    coat: float
-
-
-def gelbelt_sources(light_design: int, left_out: OmittedReturn) -> dict[str, Provenance]:
-    """Return the provenance of a GelBelt with one of its light designs."""
-    way_back = f"{left_out.length:.0f} of {left_out.whole:.0f} mm along the inner face"
+    tape, gel = layers
+    inner, outer = radius + tape, radius + tape + gel
+    left_out = math.pi * radius + run
+    volume = width * (0.5 * math.pi * (outer**2 - inner**2) + gel * run)
+    area = width * (math.pi * outer + run)
+    way_back = f"{left_out:.0f} of {drawn + left_out:.0f} mm along the inner face"
     assumed, sourced, derived = Status.ASSUMED, Status.SOURCED, Status.DERIVED
     paper = "OptiSense paper, GelBelt"
     where = {
@@ -49,17 +53,17 @@ def gelbelt_sources(light_design: int, left_out: OmittedReturn) -> dict[str, Pro
             assumed,
             "3 mm of silicone XP-565, as wide as the window; 36 mm assumed; drawn as far as a "
             f"quarter turn around each wheel: the belt's way back is left out, {way_back}; it "
-            f"takes {left_out.gel / 1000.0:.1f} cm^3 more",
+            f"takes {volume / 1000.0:.1f} cm^3 more",
         ),
         "parts.skin": (
             assumed,
             "outer face of the gel where it does not lie on a wheel; far-coat has the rest that is "
-            f"drawn, and the belt's way back takes {left_out.coat / 100.0:.0f} cm^2 more",
+            f"drawn, and the belt's way back takes {area / 100.0:.0f} cm^2 more",
         ),
         "parts.tape": (
             assumed,
             "0.05 mm, usual for clear tape; drawn as far as the gel: the belt takes "
-            f"{left_out.whole:.0f} mm of it",
+            f"{drawn + left_out:.0f} mm of it",
         ),
         "parts.film": (assumed, "0.02 mm: any gap of more than some wavelengths does the same"),
         "parts.window": (assumed, "50 x 36 x 6 mm"),

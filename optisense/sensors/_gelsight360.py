@@ -16,7 +16,6 @@ import numpy as np
 from optisense import library
 from optisense.design import (
     Absorber,
-    Camera,
     Dielectric,
     Part,
     Provenance,
@@ -35,7 +34,7 @@ from optisense.sensors._led_boards import (
     ring,
 )
 from optisense.sensors._led_flux import BALANCED, balanced_flux
-from optisense.sensors._shapes import revolve
+from optisense.sensors._shapes import axial_camera, revolve
 from optisense.sensors._sources import XP565, provenance_of
 from optisense.sensors._tip_shape import TipShape
 from optisense.sensors.dimensions import (
@@ -185,15 +184,7 @@ def gelsight360(size: GelSight360Dimensions) -> SensorDesign:
             ),
         },
         lights=lights,
-        camera=Camera(
-            model="ov5647-fisheye-160",
-            projection="equidistant",
-            fov=size.fov,
-            resolution=size.resolution,
-            position=(0.0, 0.0, 0.0),
-            direction=(0.0, 0.0, 1.0),
-            up=(0.0, 1.0, 0.0),
-        ),
+        camera=axial_camera("ov5647-fisheye-160", size.fov, size.resolution, 0.0, "equidistant"),
         provenance=_provenance(size.base_ring),
     )
     dome = 1.0 - (1.0 - size.flattest) * size.resin_design / DESIGNS
@@ -209,11 +200,8 @@ def gelsight360(size: GelSight360Dimensions) -> SensorDesign:
 def _solids(
     shape: TipShape, layers: tuple[float, float], dome: float, tessellation: float
 ) -> dict[str, TriangleMesh]:
-    """Return coating, gel, shell and the black bottom, on common points.
-
-    Args:
-        layers: thickness of gel and shell, mm.
-        dome: share of the innermost dome's height that is left.
+    """Return coating, gel, shell and the black bottom, on common points, with the thickness (mm) of
+    gel and shell, and the share of the innermost dome's height that is left.
     """
     gel, shell = layers
     outer = shape.profile(shape.edge, tessellation)

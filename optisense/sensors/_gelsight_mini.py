@@ -44,12 +44,8 @@ green border that no real unit shows.
 def unfitted_design(
     build: Callable[..., SensorDesign] = gelsight_mini_ideal, **dimensions: Any
 ) -> SensorDesign:
-    """Return the design that the fit starts from: an ideal GelSight Mini with a wide view and
-    guide.
-
-    Args:
-        build: `gelsight_mini_ideal` or a bent form of it.
-        dimensions: its arguments.
+    """Return the design that the fit starts from: an ideal GelSight Mini, or a bent form of it,
+    with a wide view and guide.
     """
     own: dict[str, Any] = {"view_width": VIEW_WIDTH, "guide_size": GUIDE_SIZE}
     design = build(**own | dimensions)

@@ -14,7 +14,6 @@ from typing import ClassVar
 from optisense import library
 from optisense.design import (
     Cage,
-    Camera,
     Dielectric,
     LightGroup,
     Material,
@@ -29,7 +28,7 @@ from optisense.design.colour import NAMED_COLOURS
 from optisense.geometry import TriangleMesh
 from optisense.sensors._gelsight_mini_sources import provenance
 from optisense.sensors._led_flux import balanced_flux
-from optisense.sensors._shapes import row_of_lights
+from optisense.sensors._shapes import axial_camera, row_of_lights
 from optisense.sensors.dimensions import (
     Dimensions,
     Length,
@@ -139,18 +138,15 @@ def _flat(size: GelSightMiniDimensions) -> SensorDesign:
             "guide": Part(role=Role.SUPPORT, mesh="meshes/guide.obj", material=GUIDE),
         },
         lights={
-            # The camera looks along +z with +y up, so the right of the picture is -x.
             "red": _row("red", (0, 1), half_y + size.led_gap, lamp_z, *leds),
             "green": _row("green", (-1, 0), half_x + size.led_gap, lamp_z, *leds),
             "blue": _row("blue", (0, -1), half_y + size.led_gap, lamp_z, *leds),
         },
-        camera=Camera(
-            model="gelsight-mini",
-            fov=_field_of_view(size.view_width, layers) if size.fov is None else size.fov,
-            resolution=size.resolution,
-            position=(0.0, 0.0, guide_top - size.pupil_distance),
-            direction=(0.0, 0.0, 1.0),
-            up=(0.0, 1.0, 0.0),
+        camera=axial_camera(
+            "gelsight-mini",
+            _field_of_view(size.view_width, layers) if size.fov is None else size.fov,
+            size.resolution,
+            guide_top - size.pupil_distance,
         ),
         provenance=provenance(),
     )
@@ -220,11 +216,8 @@ def _bent(
     moved: list[tuple[int, int, int]],
     rise: tuple[float, float],
 ) -> SensorDesign:
-    """Return a flat sensor with some control points raised.
-
-    Args:
-        rise: displacement of the control points, mm, and the share of it by which the gel rises in
-            the middle.
+    """Return a flat sensor with some control points raised, by a height (mm) of which the gel rises
+    by a share in the middle.
     """
     design = _flat(size)
     height, share = rise
@@ -277,11 +270,8 @@ def _index(material: Material) -> float:
 
 
 def _field_of_view(view_width: float, layers: list[tuple[float, float]]) -> float:
-    """Return the field of view with which a pinhole sees `view_width` (mm) behind flat layers,
-    degrees.
-
-    Args:
-        layers: thickness (mm) and refractive index of each layer, from the pinhole on.
+    """Return the field of view, degrees, with which a pinhole sees `view_width` (mm) behind flat
+    layers, each with its thickness (mm) and refractive index.
     """
 
     def too_wide(sine: float) -> bool:  # Snell: the index times the sine is the same throughout

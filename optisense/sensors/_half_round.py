@@ -52,13 +52,11 @@ class HalfRound:
         return HalfRound(self.width - 2.0 * distance, self.straight - distance, corner, self.centre)
 
     def points(self, tessellation: float) -> FloatArray:
-        """Return the corners (n, 2) of a polygon in the outline, counter-clockwise, mm.
+        """Return the corners (n, 2), mm, of a polygon in the outline, counter-clockwise, with sides
+        of about `tessellation` mm.
 
-        Each piece is divided into an odd number, so that no corner lies on the y axis. The numbers
-        follow from this outline's `tessellation`; use `like` for outlines inside it.
-
-        Args:
-            tessellation: approximate length of the sides, mm.
+        Each piece is divided into an odd number, so that no corner lies on the y axis. Outlines
+        inside it take as many corners by `like`.
         """
         return self._cut(self._pieces(tessellation))
 
@@ -84,21 +82,18 @@ class HalfRound:
         inner = self.radius - self.corner
         low = self.end + self.corner
         parts = [
-            _line((-inner, self.end), (inner, self.end), end),
+            np.linspace((-inner, self.end), (inner, self.end), end + 1),
             arc((inner, low), self.corner, -90.0, 0.0, corner),
-            _line((self.radius, low), (self.radius, self.centre), side),
+            np.linspace((self.radius, low), (self.radius, self.centre), side + 1),
             arc((0.0, self.centre), self.radius, 0.0, 180.0, half),
-            _line((-self.radius, self.centre), (-self.radius, low), side),
+            np.linspace((-self.radius, self.centre), (-self.radius, low), side + 1),
             arc((-inner, low), self.corner, 180.0, 270.0, corner),
         ]
         return np.concatenate([part[:-1] for part in parts])
 
     def at(self, distance: float) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Return a point on the outline, and its outward unit normal.
-
-        Args:
-            distance: distance along the outline from the middle of the straight end, mm; towards +x
-                first if positive.
+        """Return the point at a distance (mm) along the outline from the middle of the straight
+        end, towards +x first if positive, and its outward unit normal.
         """
         along = abs(distance)
         sign = math.copysign(1.0, distance)
@@ -127,13 +122,13 @@ class HalfRound:
 
 
 def stacked(rings: Sequence[FloatArray]) -> TriangleMesh:
-    """Return a closed solid whose outside is a sequence of rings, closed by a fan at both ends.
+    """Return a closed solid whose outside is a sequence of rings (n, 3), mm, closed by a fan at
+    both ends.
 
-    Args:
-        rings: rings (n, 3), mm; rings of one length are joined corner by corner, others by the
-            share of the perimeter. Seen from outside of the solid, the rings run counter-clockwise
-            about +z from the first (below) to the last (above); a solid with a cavity goes from the
-            cavity's floor up, over its rim and down outside.
+    Rings of one length are joined corner by corner, others by the share of the perimeter. Seen from
+    outside of the solid, the rings run counter-clockwise about +z from the first (below) to the
+    last (above); a solid with a cavity goes from the cavity's floor up, over its rim and down
+    outside.
     """
     vertices = np.concatenate([*rings, [_pole(rings[0])], [_pole(rings[-1])]])
     starts = np.cumsum([0, *(len(ring) for ring in rings)])
@@ -170,7 +165,3 @@ def _pole(ring: FloatArray) -> FloatArray:
     middle = 0.5 * (ring.min(axis=0) + ring.max(axis=0))
     reach = np.abs(ring - middle).max(axis=0)
     return np.asarray(middle + ASIDE * reach * np.array([0.61, 0.79, 0.0]))
-
-
-def _line(start: tuple[float, float], end: tuple[float, float], pieces: int) -> FloatArray:
-    return np.linspace(start, end, pieces + 1)

@@ -9,6 +9,7 @@ import numpy as np
 
 from optisense.array_types import FloatArray
 from optisense.design import AreaEmitter, Light, LightGroup
+from optisense.design.posing import triple
 from optisense.geometry import TriangleMesh
 from optisense.geometry.rotations import rotation
 from optisense.sensors._led_flux import package
@@ -27,11 +28,6 @@ WALL_MARGIN = 0.15
 """Thickness of the wall that remains on both sides of a board, mm, an assumption."""
 RING_HEIGHT = 0.3
 """z of the windows of a ring of LEDs at the foot of the wall, mm, assumed: just inside it."""
-
-
-def led_height() -> float:
-    """Return the height of an LED above its board, mm: that of its package in the library."""
-    return package(LED_MODEL)[2]
 
 
 @dataclass(frozen=True)
@@ -67,7 +63,7 @@ class LedBoards:
     @property
     def _window(self) -> float:
         """Distance from the middle of a board to the windows of its LEDs, mm."""
-        return 0.5 * self.thickness + led_height() + WINDOW_GAP
+        return 0.5 * self.thickness + package(LED_MODEL)[2] + WINDOW_GAP
 
     def _heights(self) -> FloatArray:
         """Return z of the middles of the LEDs, (leds,) mm."""
@@ -76,7 +72,7 @@ class LedBoards:
 
     def mesh(self) -> TriangleMesh:
         """Return the boards and the bodies of the LEDs on them: closed boxes that touch."""
-        across, half, high = 0.5 * self.thickness, self._half_depth, led_height()
+        across, half, high = 0.5 * self.thickness, self._half_depth, package(LED_MODEL)[2]
         top = self.bottom + self.height
         bodies = [
             TriangleMesh.box(
@@ -97,22 +93,21 @@ class LedBoards:
         )
 
     def light_groups(self, colours: str, flux: float) -> dict[str, LightGroup]:
-        """Return one light group per face, `lg1` to `lg8`, anticlockwise seen from +z.
+        """Return one light group per face, `lg1` to `lg8`, anticlockwise seen from +z, with a
+        letter of its colour and a flux of each LED, mW.
 
-        Args:
-            colours: one letter per group. Group 1 is on the board at 0 degrees and shines
-                anticlockwise; group 2 faces it from the next board, and so on.
-            flux: radiant flux of each LED, mW.
+        Group 1 is on the board at 0 degrees and shines anticlockwise; group 2 faces it from the
+        next board, and so on.
         """
         groups = {}
         for number, letter in enumerate(colours, start=1):
             side = 1.0 if number % 2 else -1.0
             turn = rotation((0.0, 0.0, 1.0), 90.0 * (number // 2 % BOARDS))
             lights = [
-                _light(
-                    turn @ (self.radius, side * self._window, z),
-                    turn @ (0.0, side, 0.0),
-                    np.array([0.0, 0.0, 1.0]),
+                Light(
+                    position=triple(turn @ (self.radius, side * self._window, z)),
+                    direction=triple(turn @ (0.0, side, 0.0)),
+                    up=(0.0, 0.0, 1.0),
                 )
                 for z in self._heights()
             ]
@@ -121,29 +116,18 @@ class LedBoards:
 
 
 def ring(colour: str, radius: float, count: int, flux: float) -> LightGroup:
-    """Return LEDs in a ring at the foot of a wall that shine up along it; none is at 0 or 90
-    degrees.
-
-    Args:
-        colour: letter of the colour.
-        radius: distance from the axis to the middle of the LEDs, mm.
-        count: number of LEDs; a multiple of four keeps clear of the boards.
-        flux: radiant flux of each LED, mW.
+    """Return LEDs in a ring, with a radius (mm) to their middles, at the foot of a wall that shine
+    up along it; if their number is a multiple of four, none is below a board.
     """
     lights = [
-        _light(
-            np.array([radius * math.cos(angle), radius * math.sin(angle), RING_HEIGHT]),
-            np.array([0.0, 0.0, 1.0]),
-            np.array([-math.sin(angle), math.cos(angle), 0.0]),
+        Light(
+            position=(radius * math.cos(angle), radius * math.sin(angle), RING_HEIGHT),
+            direction=(0.0, 0.0, 1.0),
+            up=(-math.sin(angle), math.cos(angle), 0.0),
         )
         for angle in 2.0 * np.pi * (np.arange(count) + 0.5) / count
     ]
     return _group(colour, flux, lights)
-
-
-def _light(position: FloatArray, direction: FloatArray, up: FloatArray) -> Light:
-    (px, py, pz), (dx, dy, dz), (ux, uy, uz) = (v.tolist() for v in (position, direction, up))
-    return Light(position=(px, py, pz), direction=(dx, dy, dz), up=(ux, uy, uz))
 
 
 def _group(letter: str, flux: float, lights: list[Light]) -> LightGroup:

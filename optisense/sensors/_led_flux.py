@@ -14,14 +14,11 @@ BALANCED = (
 
 
 def balanced_flux(model: str) -> float:
-    """Return the radiant flux that an LED has in each of its colours, mW.
+    """Return the radiant flux that an LED of the library has in each of its colours, mW.
 
     Boards of GelSight sensors bring their colours to one brightness with resistors (the published
     board of GraspEveryThing has 45, 400 and 600 ohm for red, green and blue): the weakest colour
     runs at its nominal current.
-
-    Args:
-        model: name of a light of the library.
     """
     return min(_nominal(model).values())
 

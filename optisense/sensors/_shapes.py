@@ -7,14 +7,15 @@ there and the media on both sides are found face by face.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from optisense.array_types import FloatArray
-from optisense.design import Light
+from optisense.design import Camera, Light
+from optisense.design.posing import triple
 from optisense.geometry import TriangleMesh
 from optisense.geometry.mesh import grid_faces
 
@@ -33,20 +34,15 @@ ASIDE = 0.01
 
 
 def revolve(profile: ArrayLike, segments: int) -> TriangleMesh:
-    """Return a profile turned about the z axis.
+    """Return a profile, r >= 0 and z, (n, 2) mm, turned about the z axis.
 
     Normals point to the right of the direction along the profile (r to the right, z up): out of a
     solid whose outline runs counter-clockwise. Two neighbouring points on the axis make no faces.
 
-    Args:
-        profile: r and z, (n, 2) mm, r >= 0; an outline of a ring ends on its first point.
-        segments: number of corners of a full turn.
-
-    Returns:
-        A mesh of n rings of `segments` vertices, one vertex where r is 0; welded, so closed
-        outlines and outlines from axis to axis make closed meshes. No edge lies in the xz or yz
-        plane and no corner on the axis, where a camera's rays would run exactly along edges: a ray
-        tracer may miss both faces there.
+    The welded mesh has n rings of `segments` vertices, one vertex where r is 0; closed outlines,
+    which end on their first point, and outlines from axis to axis make closed meshes. No edge lies
+    in the xz or yz plane and no corner on the axis, where a camera's rays would run exactly along
+    edges: a ray tracer may miss both faces there.
     """
     points = np.asarray(profile, dtype=np.float64)
     turn = 2.0 * np.pi * (np.arange(segments) + TWIST) / segments
@@ -81,17 +77,10 @@ def revolve(profile: ArrayLike, segments: int) -> TriangleMesh:
 
 
 def ribbon(path: ArrayLike, half_width: float, rows: int) -> TriangleMesh:
-    """Return a path in the xz plane extruded along y, to both sides; an open sheet.
+    """Return a path in the xz plane, (n, 2) mm, extruded along y to both sides; an open sheet.
 
-    Normals point to the left of the direction along the path (x to the right, z up).
-
-    Args:
-        path: x and z, (n, 2) mm.
-        half_width: half of the width along y, mm.
-        rows: number of strips across the width.
-
-    Returns:
-        A mesh of n times (rows + 1) vertices, row by row along the path.
+    Normals point to the left of the direction along the path (x to the right, z up). The mesh has n
+    times (rows + 1) vertices, row by row along the path.
     """
     points = np.asarray(path, dtype=np.float64)
     y = np.linspace(-half_width, half_width, rows + 1)
@@ -101,16 +90,10 @@ def ribbon(path: ArrayLike, half_width: float, rows: int) -> TriangleMesh:
 
 
 def strip(lower: ArrayLike, upper: ArrayLike, half_width: float, rows: int) -> TriangleMesh:
-    """Return the closed solid between two paths in the xz plane, extruded along y.
+    """Return the closed solid between two paths in the xz plane, (n, 2) mm, extruded along y.
 
-    Args:
-        lower, upper: x and z, (n, 2) mm; `upper` lies to the left of the direction along them. Each
-            point is joined to its partner.
-        half_width: half of the width along y, mm.
-        rows: number of strips across the width.
-
-    Returns:
-        A mesh that has, bit for bit, the vertices of `ribbon(upper)` and `ribbon(lower)`.
+    `upper` lies to the left of the direction along the paths. The mesh has, bit for bit, the
+    vertices of `ribbon(upper)` and `ribbon(lower)`.
     """
     bottom, top = np.asarray(lower, dtype=np.float64), np.asarray(upper, dtype=np.float64)
     count = len(bottom)
@@ -131,11 +114,8 @@ def strip(lower: ArrayLike, upper: ArrayLike, half_width: float, rows: int) -> T
 
 
 def rod(outline: ArrayLike, half_width: float) -> TriangleMesh:
-    """Return a convex outline in the xz plane extruded along y: a closed prism.
-
-    Args:
-        outline: x and z, (n, 2) mm, counter-clockwise (x to the right, z up).
-        half_width: half of the width along y, mm.
+    """Return a convex outline in the xz plane, (n, 2) mm, counter-clockwise (x to the right, z up),
+    extruded along y: a closed prism.
     """
     points = np.asarray(outline, dtype=np.float64)
     count = len(points)
@@ -156,10 +136,8 @@ def rod(outline: ArrayLike, half_width: float) -> TriangleMesh:
 def arc(
     centre: tuple[float, float], radius: float, start: float, end: float, pieces: int
 ) -> FloatArray:
-    """Return points on an arc in a plane, (pieces + 1, 2) mm.
-
-    Args:
-        start, end: angles from the first axis towards the second, degrees.
+    """Return points on an arc in a plane, (pieces + 1, 2) mm, from one angle to another, degrees
+    from the first axis towards the second.
     """
     angle = np.radians(np.linspace(start, end, pieces + 1))
     return np.column_stack([centre[0] + radius * np.cos(angle), centre[1] + radius * np.sin(angle)])
@@ -171,6 +149,27 @@ def pieces_of_arc(radius: float, degrees: float, tessellation: float, least: int
     return max(least, math.ceil(length / tessellation), math.ceil(abs(degrees) / 15.0))
 
 
+def axial_camera(
+    model: str,
+    fov: float,
+    resolution: tuple[int, int],
+    z: float,
+    projection: Literal["perspective", "equidistant"] = "perspective",
+) -> Camera:
+    """Return a camera with its pupil on the z axis, at z (mm), that looks along the axis, with +y
+    up; right in its picture is -x.
+    """
+    return Camera(
+        model=model,
+        projection=projection,
+        fov=fov,
+        resolution=resolution,
+        position=(0.0, 0.0, z),
+        direction=(0.0, 0.0, 1.0),
+        up=(0.0, 1.0, 0.0),
+    )
+
+
 def row_of_lights(
     centre: Vector,
     along: Vector,
@@ -180,21 +179,11 @@ def row_of_lights(
     *,
     upright: bool = True,
 ) -> list[Light]:
-    """Return lights side by side that all shine in one direction.
-
-    Args:
-        centre: middle of the row, mm.
-        along: unit vector of the row.
-        pitch: distance between neighbours, mm.
-        direction: direction in which they shine.
-        upright: True if `along` is the `up` of each light, False if they have none.
+    """Return lights `pitch` mm apart along a unit vector that all shine in one direction; if they
+    are upright, this vector is their `up`, else they have none.
     """
-    offsets: Sequence[float] = [(index - 0.5 * (count - 1)) * pitch for index in range(count)]
-    up = along if upright else None
-    places = [
-        tuple(c + offset * a for c, a in zip(centre, along, strict=True)) for offset in offsets
-    ]
-    return [
-        Light(position=(place[0], place[1], place[2]), direction=direction, up=up)
-        for place in places
-    ]
+    lights = []
+    for offset in (np.arange(count) - 0.5 * (count - 1)) * pitch:
+        place = triple(np.array(centre) + offset * np.array(along))
+        lights.append(Light(position=place, direction=direction, up=along if upright else None))
+    return lights

@@ -28,14 +28,8 @@ BESIDE_MIRROR = 0.5
 def check_mirrors(
     m1: CurvedMirror, sagitta: float, m2: FlatMirror, gel_outline: FloatArray
 ) -> None:
-    """Check that M2 is clear of the gel, and M1 of M2 and of what the camera sees of it.
-
-    Args:
-        m1, sagitta: curved mirror, and its sagitta, mm.
-        gel_outline: outline of the gel, (n, 2) mm, closed.
-
-    Raises:
-        DesignError: a part is in the way; the message says which, and where.
+    """Raise DesignError if M2 is not clear of the gel's closed outline (n, 2), mm, or M1 of M2 and
+    of what the camera sees of it.
     """
     flat, curved = shapely.LineString(m2.ends()), shapely.LineString(m1.curve(sagitta))
     crossed = flat.intersection(shapely.Polygon(gel_outline))
@@ -69,11 +63,8 @@ def housing(
     `side-walls`. They are sheets that absorb light, with inward normals.
 
     Args:
-        back_outline: points (x, z) from base to tip, mm.
-        m1, most: curved mirror, and its largest sagitta, mm.
+        most: largest sagitta of M1, mm.
         widths: widths of the gel and of the widest mirror, mm.
-        led_gap: air gap between LEDs and gel, mm.
-        wall_thickness: thickness of the walls, mm.
 
     Raises:
         DesignError: the outline crosses itself, or a mirror or the camera is not inside.
@@ -98,13 +89,8 @@ def housing(
 def led_covers(
     palm: Palm, inner: FloatArray, widths: tuple[float, float], led_gap: float
 ) -> TriangleMesh:
-    """Return a channel along each side of the gel that hides the LEDs in it from the camera: a
-    sheet that absorbs light, with its normals towards the LEDs.
-
-    Args:
-        inner: inner face of the gel, (n, 2) mm.
-        widths: widths of the gel and of the widest mirror, mm.
-        led_gap: air gap between LEDs and gel, mm.
+    """Return a channel along each side of the gel, with an inner face (n, 2), mm, that hides the
+    LEDs in it from the camera: a sheet that absorbs light, with its normals towards the LEDs.
     """
     gel_half, half = 0.5 * widths[0], _half_width(widths, led_gap)
     channel = np.concatenate([palm.points, inner[::-1], palm.points[:1]])

@@ -131,10 +131,8 @@ class CurvedMirror:
         return np.asarray(straight + sagitta * t * t * self.forward)
 
     def largest_sagitta(self, obstacle: FloatArray, clearance: float) -> float:
-        """Return the largest sagitta with which it keeps `clearance` from a closed outline, mm.
-
-        Args:
-            obstacle: outline of the skin, (n, 2) mm.
+        """Return the largest sagitta with which it keeps `clearance` from the closed outline (n, 2)
+        of the skin, mm.
 
         Raises:
             DesignError: even the flat mirror is closer.
@@ -242,13 +240,9 @@ class FlatMirror:
     def facing(
         bottom: ArrayLike, tilt: float, length: float | None, inner: FloatArray
     ) -> FlatMirror:
-        """Return a mirror that ends where lines of sight over it would meet the gel before M1.
-
-        Args:
-            bottom: end at the base, (2,) mm.
-            tilt: angle to the z axis, degrees.
-            length: length, mm; None for `LONGEST_M2` or as much of it as sees past the gel.
-            inner: inner face of the gel from base to tip, (n, 2) mm.
+        """Return a mirror by its end at the base, (2,) mm, its angle to the z axis, degrees, and
+        its length, mm; None for `LONGEST_M2` or as much of it as sees M1 past the inner face (n, 2)
+        of the gel.
 
         Raises:
             DesignError: its back is to the camera, or its sight past the gel is blocked.

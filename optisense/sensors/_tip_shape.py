@@ -58,15 +58,11 @@ class TipShape:
         return math.degrees(math.atan2(self.core, self.cone)) if self.cone > 0.0 else 90.0
 
     def profile(self, rounding: float, tessellation: float) -> NDArray[np.float64]:
-        """Return the curve that lies `rounding` (mm) outside the core.
+        """Return the curve that lies `rounding` (above 0, at most `edge`, mm) outside the core.
 
-        Args:
-            rounding: rounding radius, above 0, at most `edge`, mm.
-            tessellation: approximate length of a piece of the largest profile, mm.
-
-        Returns:
-            r and z, (n, 2) mm, from the foot of the wall (core + rounding, 0) to the axis; n is the
-            same for all roundings, and so is the normal at each point.
+        It is r and z, (n, 2) mm, from the foot of the wall (core + rounding, 0) to the axis; n is
+        the same for all roundings, and so is the normal at each point. A piece of the largest
+        profile is about `tessellation` mm long.
         """
         lean = self.lean
         slant = math.hypot(self.core, self.cone)
@@ -88,29 +84,6 @@ class TipShape:
         points = np.concatenate([*parts, nose])
         points[-1, 0] = 0.0
         return points
-
-    def volume(self, rounding: float) -> float:
-        """Return the volume inside a smooth profile, above z = 0, mm^3.
-
-        It follows from Steiner's formula for the body that is parallel to a cone, without its lower
-        half.
-        """
-        lean = math.radians(self.lean)
-        slant = math.hypot(self.core, self.cone)
-        tip = (
-            self.core**2 * self.cone / 3.0
-            + self.core * slant * rounding
-            + (self.cone + self.core * lean) * rounding**2
-            + 2.0 / 3.0 * rounding**3
-        )
-        return math.pi * ((self.core + rounding) ** 2 * self.shoulder + tip)
-
-    def area(self, rounding: float) -> float:
-        """Return the area of a smooth profile (wall and tip, no bottom), mm^2."""
-        lean = math.radians(self.lean)
-        slant = math.hypot(self.core, self.cone)
-        tip = self.core * slant + 2.0 * (self.cone + self.core * lean) * rounding
-        return math.pi * (2.0 * (self.core + rounding) * self.shoulder + tip + 2.0 * rounding**2)
 
 
 def _between(
