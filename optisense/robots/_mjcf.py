@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from xml.sax.saxutils import quoteattr
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
 
@@ -21,59 +21,44 @@ the middle of the picture: only their ratio counts."""
 
 def mjcf(body: SensorBody, folder: str) -> str:
     """Return the text of an MJCF file with its mesh files (binary STL, m) in a folder beside it."""
-    lines = [f"<mujoco model={quoteattr(body.name)}>"]
-    lines.append(f'  <compiler angle="radian" meshdir={quoteattr(folder)}/>')
-    lines.append("  <asset>")
+    model = Element("mujoco", model=body.name)
+    SubElement(model, "compiler", angle="radian", meshdir=folder)
+    asset = SubElement(model, "asset")
     for each in [*body.looks, *body.hulls]:
         # A sheet has no volume, of which MuJoCo would otherwise compute the inertia.
-        shell = "" if each.is_closed else ' inertia="shell"'
-        lines.append(
-            f"    <mesh name={quoteattr(each.name)} file={quoteattr(each.name + '.stl')}{shell}/>"
-        )
-    lines += ["  </asset>", "  <worldbody>", f"    <body name={quoteattr(body.name)}>"]
-    xx, yy, zz, xy, xz, yz = (body.inertia[i, j] for i, j in _UPPER)
-    lines.append(
-        f'      <inertial pos="{numbers(body.centre)}" mass="{body.mass:.9g}" '
-        f'fullinertia="{numbers((xx, yy, zz, xy, xz, yz))}"/>'
-    )
+        shell = {} if each.is_closed else {"inertia": "shell"}
+        SubElement(asset, "mesh", name=each.name, file=f"{each.name}.stl", **shell)
+    sensor = SubElement(SubElement(model, "worldbody"), "body", name=body.name)
+    inertia = numbers(body.inertia[i, j] for i, j in _UPPER)
+    at = {"pos": numbers(body.centre), "mass": f"{body.mass:.9g}", "fullinertia": inertia}
+    SubElement(sensor, "inertial", at)
     for each in body.looks:
-        lines.append(
-            f'      <geom type="mesh" mesh={quoteattr(each.name)} group="2" contype="0" '
-            f'conaffinity="0" mass="0" rgba="{numbers(each.colour)}"/>'
-        )
+        shown = {"group": "2", "contype": "0", "conaffinity": "0", "mass": "0"}
+        colour = numbers(each.colour)
+        SubElement(sensor, "geom", type="mesh", mesh=each.name, **shown, rgba=colour)
     for each in body.hulls:
-        friction = ""
-        if each.is_gel:
-            # Of two geoms, the one of higher priority gives the friction; else, the larger counts.
-            friction = f' friction="{body.friction:g} 0.005 0.0001" priority="1"'
-        lines.append(
-            f'      <geom name={quoteattr(each.name)} type="mesh" mesh={quoteattr(each.name)} '
-            f'group="3" mass="0"{friction}/>'
-        )
+        # Of two geoms, the one of higher priority gives the friction; else, the larger counts.
+        gel = {"friction": f"{body.friction:g} 0.005 0.0001", "priority": "1"}
+        touched = {"group": "3", "mass": "0", **(gel if each.is_gel else {})}
+        SubElement(sensor, "geom", name=each.name, type="mesh", mesh=each.name, **touched)
     right, down, _ = body.camera.axes.T
     width, height = body.resolution
-    lines.append(
-        f'      <camera name="camera" pos="{numbers(body.camera.origin)}" '
-        f'xyaxes="{numbers((*right, *-down))}" {_view(body)} resolution="{width} {height}"/>'
-    )
+    pose = {"pos": numbers(body.camera.origin), "xyaxes": numbers((*right, *-down))}
+    size = {"resolution": f"{width} {height}"}
+    SubElement(sensor, "camera", name="camera", **pose, **_view(body), **size)
     skin, (middle, half) = body.skin, body.skin_box
     axes = numbers((*skin.axes[:, 0], *skin.axes[:, 1]))
-    lines.append(
-        f'      <site name="skin" pos="{numbers(skin.origin)}" xyaxes="{axes}" '
-        'size="0.0005" group="4"/>'
-    )
-    box = np.maximum(half + LEAST_HALF_SIDE, LEAST_HALF_SIDE)
-    lines.append(
-        f'      <site name="touched" type="box" pos="{numbers(skin.origin + skin.axes @ middle)}" '
-        f'xyaxes="{axes}" size="{numbers(box)}" group="4" rgba="0 0 0 0"/>'
-    )
-    lines += ["    </body>", "  </worldbody>", "  <sensor>"]
-    lines.append('    <touch name="normal_force" site="touched"/>')
-    lines += ["  </sensor>", "</mujoco>"]
-    return "\n".join(lines) + "\n"
+    pose = {"pos": numbers(skin.origin), "xyaxes": axes}
+    SubElement(sensor, "site", name="skin", **pose, size="0.0005", group="4")
+    pose = {"pos": numbers(skin.origin + skin.axes @ middle), "xyaxes": axes}
+    box = numbers(np.maximum(half + LEAST_HALF_SIDE, LEAST_HALF_SIDE))
+    touched = {"type": "box", **pose, "size": box, "group": "4", "rgba": "0 0 0 0"}
+    SubElement(sensor, "site", name="touched", **touched)
+    SubElement(SubElement(model, "sensor"), "touch", name="normal_force", site="touched")
+    return xml_text(model)
 
 
-def _view(body: SensorBody) -> str:
+def _view(body: SensorBody) -> dict[str, str]:
     """Return the attributes of the camera's angle of view, and of its axis if it is off the middle.
 
     MuJoCo's `principal` is the place of the picture's middle from the axis, to the right and down.
@@ -81,14 +66,12 @@ def _view(body: SensorBody) -> str:
     width, height = body.resolution
     across, down = body.camera_middle
     if across == down == 0.5:
-        return f'fovy="{body.camera_angle:.9g}"'
+        return {"fovy": f"{body.camera_angle:.9g}"}
     size = SENSOR_HEIGHT * np.array([width / height, 1.0])
     focal = 0.5 * SENSOR_HEIGHT / np.tan(np.radians(0.5 * body.camera_angle))
     principal = size * (0.5 - np.array([across, down]))
-    return (
-        f'sensorsize="{numbers(size)}" focal="{numbers((focal, focal))}" '
-        f'principal="{numbers(principal)}"'
-    )
+    values = {"sensorsize": size, "focal": (focal, focal), "principal": principal}
+    return {name: numbers(value) for name, value in values.items()}
 
 
 _UPPER = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
@@ -98,3 +81,9 @@ _UPPER = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 def numbers(values: Iterable[float]) -> str:
     """Return numbers with nine digits, separated by spaces; tiny ones that are rounding are 0."""
     return " ".join(f"{0.0 if abs(value) < 1e-15 else value:.9g}" for value in values)
+
+
+def xml_text(root: Element) -> str:
+    """Return the text of an XML file with indented elements."""
+    indent(root)
+    return tostring(root, encoding="unicode") + "\n"
