@@ -4,6 +4,7 @@ import os
 
 import numpy as np
 import pytest
+from gels import gel_of, pad
 from hertz import plane_strain_modulus
 
 from optisense import library
@@ -20,7 +21,6 @@ from optisense.geometry import (
 from optisense.geometry.contact import place
 from optisense.mechanics import (
     Elasticity,
-    Gel,
     SkinState,
     elasticity_in_words,
     elasticity_of,
@@ -31,8 +31,7 @@ from optisense.optics._ray_model import RayModel
 from optisense.sensors import load
 
 GEL = Elasticity(0.435, 0.49)
-TOP = TriangleMesh.grid((20.0, 16.0)).flipped()  # looks into the gel below it
-BLOCK = TriangleMesh.box((-10.0, -8.0, -4.25), (10.0, 8.0, 0.0))
+TOP, BLOCK = pad(20.0, 16.0, 4.25)
 SURFACE = SensingSurface(TOP, (0, 0, 0), (1, 0, 0), (0, 1, 0))
 
 TIP = MeshIndenter(
@@ -44,12 +43,19 @@ TIP = MeshIndenter(
 """A pyramid that stands on its tip."""
 
 
-def gel(placed=lambda contact: place(contact, SURFACE, BLOCK)):
-    return Gel(SURFACE, TOP, [BLOCK], GEL, placed)
+def gel():
+    return gel_of(TOP, BLOCK)
 
 
 def press(*contacts):
     return gel().pressed(contacts)
+
+
+@pytest.fixture(scope="module")
+def wide():
+    """A gel that is wide enough for wide punches, and its skin."""
+    top, body = pad(50.0, 50.0, 4.25)
+    return top, gel_of(top, body)
 
 
 @pytest.fixture(scope="module")
@@ -86,28 +92,21 @@ def test_beyond_a_thickness_the_skin_bulges(ball):
     assert -0.02 < depth[0] < -0.005
 
 
+def balls(half, depth):
+    """Two balls on either side of the middle."""
+    return press(*(Contact(Sphere(1.5), at=(x, 0.0), depth=depth) for x in (-half, half)))
+
+
 def test_neighbours_lift_each_other():
-    alone = press(Contact(Sphere(1.5), at=(-2.5, 0.0), depth=0.5)).contacts[0].force
-    pair = press(
-        Contact(Sphere(1.5), at=(-2.5, 0.0), depth=0.5),
-        Contact(Sphere(1.5), at=(2.5, 0.0), depth=0.5),
-    )
-    left, right = (contact.force for contact in pair.contacts)
-    assert left == pytest.approx(right, rel=1e-3)
-    assert 1.005 < left / alone < 1.1
-    alone = press(Contact(Sphere(1.5), at=(-6.0, 0.0), depth=0.5)).contacts[0].force
-    far = press(
-        Contact(Sphere(1.5), at=(-6.0, 0.0), depth=0.5),
-        Contact(Sphere(1.5), at=(6.0, 0.0), depth=0.5),
-    )
-    assert far.contacts[0].force == pytest.approx(alone, rel=5e-3)
+    for half, least, most in ((2.5, 1.005, 1.1), (6.0, 0.995, 1.005)):
+        alone = press(Contact(Sphere(1.5), at=(-half, 0.0), depth=0.5)).contacts[0].force
+        left, right = (contact.force for contact in balls(half, 0.5).contacts)
+        assert left == pytest.approx(right, rel=1e-3)
+        assert least < left / alone < most
 
 
 def test_the_skin_has_the_shape_of_a_ball_beside_another_too():
-    pair = press(
-        Contact(Sphere(1.5), at=(-2.0, 0.0), depth=0.6),
-        Contact(Sphere(1.5), at=(2.0, 0.0), depth=0.6),
-    )
+    pair = balls(2.0, 0.6)
     x = -2.0 + np.linspace(-0.8, 0.8, 31)
     depth, _, touching = along_x(pair, x)
     assert touching.all()
@@ -145,12 +144,9 @@ def test_the_skin_follows_sharp_edges_without_going_deeper():
     assert (np.einsum("fck,fk->fc", edges.corner_normals, steep) > 0.0).all()
 
 
-def test_the_rim_of_a_wide_punch_is_as_straight_as_that_of_a_small_one():
-    top = TriangleMesh.grid((50.0, 50.0)).flipped()
-    body = TriangleMesh.box((-25.0, -25.0, -4.25), (25.0, 25.0, 0.0))
-    surface = SensingSurface(top, (0, 0, 0), (1, 0, 0), (0, 1, 0))
-    wide = Gel(surface, top, [body], GEL, lambda contact: place(contact, surface, body))
-    mesh = skin_mesh(top, wide.pressed([Contact(Plane(0.0, 0.0, 14.0), at=(0, 0), depth=0.3)]))
+def test_the_rim_of_a_wide_punch_is_as_straight_as_that_of_a_small_one(wide):
+    top, pad_of = wide
+    mesh = skin_mesh(top, pad_of.pressed([Contact(Plane(0.0, 0.0, 14.0), at=(0, 0), depth=0.3)]))
     touching = mesh.part(SkinState.TOUCHING)
     x, y, _ = touching.vertices.T
     right = (np.abs(y) < 6.0) & (x > 6.5)
@@ -160,12 +156,9 @@ def test_the_rim_of_a_wide_punch_is_as_straight_as_that_of_a_small_one():
     assert np.ptp(last) < 0.1
 
 
-def test_skin_that_bulges_outward_is_not_bent():
-    top = TriangleMesh.grid((50.0, 50.0)).flipped()
-    body = TriangleMesh.box((-25.0, -25.0, -4.25), (25.0, 25.0, 0.0))
-    surface = SensingSurface(top, (0, 0, 0), (1, 0, 0), (0, 1, 0))
-    wide = Gel(surface, top, [body], GEL, lambda contact: place(contact, surface, body))
-    mesh = skin_mesh(top, wide.pressed([Contact(Plane(0.0, 0.0, 12.0), at=(0, 0), depth=0.3)]))
+def test_skin_that_bulges_outward_is_not_bent(wide):
+    top, pad_of = wide
+    mesh = skin_mesh(top, pad_of.pressed([Contact(Plane(0.0, 0.0, 12.0), at=(0, 0), depth=0.3)]))
     lowest = mesh.vertices[:, 2][mesh.faces].min(axis=1)
     assert lowest.max() > 0.1 * 0.3
     assert (mesh.state[lowest > 0.0] == SkinState.RESTING).all()
@@ -203,7 +196,7 @@ def test_an_indenter_that_does_not_reach_the_skin_is_told():
     lifted = place(contact, SURFACE, BLOCK)
     lifted = lifted.with_vertices(lifted.vertices + [0.0, 0.0, 2.0])
     with pytest.raises(ContactError, match="does not reach the sensing surface"):
-        gel(lambda _: lifted).pressed([contact])
+        gel_of(TOP, BLOCK, placed=lambda _: lifted).pressed([contact])
 
 
 def test_small_features_of_a_large_mesh_are_pressed_too():
@@ -285,7 +278,9 @@ def test_a_force_finds_its_depth():
     pushed = Contact(Sphere(1.5), at=(0.0, 0.0), force=0.5)
     found = gel().at_depth(pushed)
     assert found.force is None
-    assert press(found).contacts[0].force == pytest.approx(0.5, rel=2e-3)
+    numbers = press(found).in_numbers()[0]
+    assert numbers["force_n"] == pytest.approx(0.5, rel=2e-3)
+    assert numbers["depth_mm"] == pytest.approx(found.depth, abs=1e-6)
 
 
 def test_thin_rods_touch_alike_in_each_direction():
@@ -295,11 +290,6 @@ def test_thin_rods_touch_alike_in_each_direction():
     )
     assert across.area == pytest.approx(along.area, rel=0.05)
     assert across.force == pytest.approx(along.force, rel=0.02)
-
-
-def test_numbers_of_a_press_have_its_depth():
-    numbers = press(Contact(TIP, at=(0.0, 0.0), depth=0.05)).in_numbers()[0]
-    assert numbers["depth_mm"] == 0.05
 
 
 def test_a_small_force_is_found_or_refused():
@@ -366,9 +356,7 @@ def test_layers_whose_curved_faces_have_other_facets_are_one_gel():
     low, high = BLOCK.bounds
     upper = wavy((*low[:2], -2.0), high, -2.0, 40)
     lower = wavy(low, (*high[:2], -2.0), -2.0, 60)
-    layers = Gel(
-        SURFACE, TOP, [upper, lower], GEL, lambda contact: place(contact, SURFACE, [upper, lower])
-    )
+    layers = gel_of(TOP, upper, lower)
     for x in (-4.0, 1.3, 9.0):  # the gel ends beside the last place
         contact = Contact(Sphere(1.5), at=(x, 0.3), depth=0.8)
         one, several = (each.pressed([contact]).contacts[0] for each in (gel(), layers))
@@ -399,15 +387,11 @@ def test_the_librarys_solaris_follows_from_its_hardness():
 
 
 def test_a_pressed_skin_is_carried_along_with_the_skin():
-    top = TriangleMesh.grid((20.0, 20.0)).flipped()
-    body = TriangleMesh.box((-10.0, -10.0, -4.25), (10.0, 10.0, 0.0))
-    surface = SensingSurface(top, (0, 0, 0), (1, 0, 0), (0, 1, 0))
-    gel = Gel(surface, top, [body], GEL, lambda contact: place(contact, surface, body))
-    mesh = skin_mesh(top, gel.pressed([Contact(Sphere(1.5), at=(0, 0), depth=0.3)]))
-    still = mesh.carried(top)
+    mesh = skin_mesh(TOP, press(Contact(Sphere(1.5), at=(0, 0), depth=0.3)))
+    still = mesh.carried(TOP)
     np.testing.assert_allclose(still.vertices, mesh.vertices, atol=1e-12)
     np.testing.assert_allclose(still.corner_normals, mesh.corner_normals, atol=1e-12)
     step = np.array([0.3, -0.2, 0.1])
-    aside = mesh.carried(top.with_vertices(top.vertices + step))
+    aside = mesh.carried(TOP.with_vertices(TOP.vertices + step))
     np.testing.assert_allclose(aside.vertices, mesh.vertices + step, atol=1e-12)
     assert aside.faces is mesh.faces and aside.state is mesh.state

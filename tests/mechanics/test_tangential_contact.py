@@ -4,20 +4,17 @@ import math
 
 import numpy as np
 import pytest
+from gels import gel_of, pad
 
 from optisense.errors import ContactError
-from optisense.geometry import Contact, MeshIndenter, SensingSurface, Sphere, TriangleMesh
-from optisense.geometry.contact import place
+from optisense.geometry import Contact, MeshIndenter, Sphere, TriangleMesh
 from optisense.geometry.contact_text import parse_contact
-from optisense.mechanics import Elasticity, Gel
+from optisense.mechanics import Elasticity
 from optisense.mechanics._convolution import GridResponse
 from optisense.mechanics._normal_contact import solve_normal_contact
 from optisense.mechanics._tangential_contact import Drag, solve_shear
 
 GEL = Elasticity(0.4, 0.45)
-TOP = TriangleMesh.grid((50.0, 50.0)).flipped()
-BLOCK = TriangleMesh.box((-25.0, -25.0, -4.0), (25.0, 25.0, 0.0))
-SURFACE = SensingSurface(TOP, (0, 0, 0), (1, 0, 0), (0, 1, 0))
 
 
 def pressed(friction=0.5, **motion):
@@ -25,9 +22,8 @@ def pressed(friction=0.5, **motion):
 
 
 def pressed_in(contacts, friction=0.5):
-    gel = Elasticity(0.4, 0.49, friction)
-    body = Gel(SURFACE, TOP, [BLOCK], gel, lambda contact: place(contact, SURFACE, BLOCK))
-    return body.pressed(contacts)
+    gel = gel_of(*pad(50.0, 50.0, 4.0), elasticity=Elasticity(0.4, 0.49, friction))
+    return gel.pressed(contacts)
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +92,7 @@ def test_two_balls_that_are_dragged_together_are_dragged_as_one_body():
     sides = -1.6, 1.6
     pair = pressed_in([Contact(Sphere(1.5), at=(x, 0.0), **drag) for x in sides])
     ball = Sphere(1.5).mesh(1.5, 1e-3)
-    body = TriangleMesh.joined([ball.transformed(translation(x)) for x in sides])
+    body = TriangleMesh.joined([ball.with_vertices(ball.vertices + (x, 0, 0)) for x in sides])
     (whole,) = pressed_in([Contact(MeshIndenter(body), at=(0.0, 0.0), **drag)]).contacts
     along = sum(contact.shear_force[0] for contact in pair.contacts)
     assert along == pytest.approx(whole.shear_force[0], rel=0.02)  # each alone: 16 % more
@@ -106,12 +102,6 @@ def test_two_balls_that_are_dragged_together_are_dragged_as_one_body():
     at_rest = pressed_in([Contact(Sphere(1.5), at=(x, 0.0), depth=0.5) for x in sides])
     moved = pair.maps(points, inward).displacement - at_rest.maps(points, inward).displacement
     assert moved[:, 0] == pytest.approx(0.05, abs=1e-3)
-
-
-def translation(x):
-    pose = np.eye(4)
-    pose[0, 3] = x
-    return pose
 
 
 def test_friction_bounds_the_force_and_none_gives_none():

@@ -9,7 +9,6 @@ import pytest
 
 from optisense import OpticalModel, sensors, set_value
 from optisense.design import SensorDesign
-from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.optics import light_at
 from optisense.sensors._half_round import HalfRound, stacked
@@ -118,23 +117,6 @@ def test_its_dome_bends_in_its_cage(design: SensorDesign) -> None:
     taller = set_value(design, f"cages.skin.points[{top}].z", 1.0)
     assert sensors.check(taller) == []
     assert taller.deformed_meshes()["gel"].bounds[1, 2] > 0.2
-
-
-@pytest.mark.parametrize(
-    ("dimensions", "words"),
-    [
-        ({"led_height": 7.0}, "not on the acrylic's edge"),
-        ({"led_pitch": 60.0}, "passes the middle of the half round"),
-        ({"edge_roughness": 1.5}, "edge_roughness is 1.5"),
-        ({"pupil_distance": 9.0}, "inside the acrylic"),
-        ({"dome_rise": 3.0}, "the gel is only"),
-        ({"edge_inset": 5.0}, "leaves no dome"),
-        ({"straight_length": 10.0}, "leaves no straight side"),
-    ],
-)
-def test_dimensions_that_contradict_one_another(dimensions: dict[str, float], words: str) -> None:
-    with pytest.raises(DesignError, match=words):
-        sensors.digit(**dimensions)  # type: ignore[arg-type]
 
 
 def test_rings_of_different_lengths_make_a_closed_solid() -> None:

@@ -20,6 +20,7 @@ from optisense.geometry import (
     Sphere,
     TriangleMesh,
 )
+from optisense.geometry.containment import inside
 from optisense.optics import OpticalModel
 from optisense.optics.transport.chief_rays import RayOutcome
 
@@ -65,6 +66,14 @@ def test_the_skin_stays_on_the_gel(sensor: SensorDesign) -> None:
     gel = {tuple(vertex) for vertex in meshes["gel"].vertices.tolist()}
     assert all(tuple(vertex) in gel for vertex in meshes["skin"].vertices.tolist())
     assert meshes["skin"].area <= meshes["gel"].area
+
+
+def test_the_skin_looks_into_the_gel(sensor: SensorDesign) -> None:
+    meshes = sensor.deformed_meshes()
+    skin, gel = meshes["skin"], meshes["gel"]
+    middles, into = skin.triangles.mean(axis=1)[::37], 0.05 * skin.face_normals[::37]
+    assert inside(middles + into, gel).all()
+    assert not inside(middles - into, gel).any()
 
 
 def test_what_is_assumed_is_marked(sensor: SensorDesign) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -32,10 +31,6 @@ def test_the_gel_lies_flat_on_the_tray(sensor: SensorDesign) -> None:
     gel, tray = (sensor.deformed_meshes()[name].bounds for name in ("gel", "tray"))
     np.testing.assert_allclose([gel[0, 2], tray[1, 2]], -4.25, atol=1e-9)
     np.testing.assert_allclose(gel[:, :2], [[-12.625, -10.375], [12.625, 10.375]], atol=1e-9)
-
-
-def test_normals_of_the_skin_look_into_the_gel(sensor: SensorDesign) -> None:
-    assert (sensor.deformed_meshes()["skin"].face_normals[:, 2] < 0).all()
 
 
 def test_flat_gel_volume_is_its_box() -> None:
@@ -115,31 +110,6 @@ def test_a_bent_sensor_takes_dimensions_too() -> None:
     assert design.provenance["cages.skin.points"].status == "assumed"
     assert "bent to a dome, ideal camera; chosen: gel_thickness 3" in design.description
     assert sensors.check(design) == []
-
-
-@pytest.mark.parametrize(
-    ("change", "message", "hint"),
-    [
-        ({"led_gap": 0.0}, "led_gap is 0", "above 0"),
-        ({"gel_thickness": math.nan}, "gel_thickness is nan", "above 0"),
-        ({"gel_size": (30.0, 20.0)}, "larger than its tray", "tray_size larger"),
-        ({"pupil_distance": 3.0}, "inside the light guide", "larger than guide_thickness"),
-        ({"leds_per_group": 9}, "9 LEDs 4 mm apart", "fewer"),
-        ({"view_width": 500.0}, "view_width 500", "smaller"),
-        ({"view_width": 0.0}, "view_width 0", "above 0"),
-    ],
-)
-def test_what_cannot_be_is_refused(change: dict[str, Any], message: str, hint: str) -> None:
-    with pytest.raises(DesignError, match=message) as caught:
-        sensors.gelsight_mini_ideal(**change)
-    assert hint in str(caught.value.hint)
-    assert caught.value.where == "gelsight-mini-ideal"
-
-
-def test_a_gel_is_not_pressed_through_its_tray() -> None:
-    with pytest.raises(DesignError, match="through its tray") as caught:
-        sensors.gelsight_mini_ideal_cylindrical(rise=-9.0)
-    assert "more than -8.5 mm" in str(caught.value.hint)
 
 
 @pytest.mark.parametrize("name", ["gelsight-mini-ideal", "gelsight-svelte", "gelsight360"])

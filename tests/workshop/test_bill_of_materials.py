@@ -53,14 +53,6 @@ def test_where_no_order_number_is_known_the_bill_says_what_will_do(flat: SensorD
     assert lights["blue"].part == "no order number known: any LED"
 
 
-@pytest.mark.parametrize("name", sensors.SENSORS.names())
-def test_every_light_of_a_built_in_sensor_can_be_ordered(name: str) -> None:
-    lights = items(sensors.build(name), "light")
-    assert lights
-    for item in lights.values():
-        assert item.part and "no order number" not in item.part
-
-
 def test_a_light_that_must_give_more_than_it_can_is_remarked_on(flat: SensorDesign) -> None:
     assert "times" not in "".join(item.note for item in items(flat, "light").values())
     bright = flat.copy()

@@ -45,6 +45,10 @@ def test_leds_far_apart_or_face_to_face_have_boards_of_their_own() -> None:
     assert boards(((0, 0, 0), up), ((0, 0, 3), down)) == [1, 2]  # face to face
     assert boards(((0, 0, 30), up), ((0, 0, 0), down)) == [1, 2]
     assert boards(((0, 0, 3), up), ((9, 0, 0), down)) == [1, 2]  # beside one another
+    assert boards(((0, 0, 5), up), ((9, 4, 5), (0, 0, 7))) == [1, 1]
+    assert boards(((0, 0, 5), up), ((9, 4, 5.5), up)) == [1, 2]  # in two planes
+    tilted = ((9, 4, 5), (0.1, 0, 1))
+    assert boards(((0, 0, 5), up), tilted, ((0, 0, 5), up)) == [1, 2, 1]
 
 
 @pytest.mark.parametrize("name", ["digit", "gelbelt", "gelsight360", "gelsight-mini-ideal"])
@@ -53,6 +57,9 @@ def test_position_files_give_places_and_directions_back(name: str, tmp_path: Pat
     design = sensors.build(name)
     files = {file.name: file for file in export(design, tmp_path, [])}
     leds = placements(design)
+    assert [led.position for led in leds] == [
+        light.position for group in design.lights.values() for light in group.lights
+    ]
     lights = [light for group in design.lights.values() for light in group.lights]
     for board in {led.board for led in leds}:
         first = next(led for led in leds if led.board == board)

@@ -53,29 +53,6 @@ def test_a_camera_in_front_sees_right_to_the_right() -> None:
         np.testing.assert_allclose(np.cross(-forward, up), right, atol=1e-12)
 
 
-def test_boards_and_what_lies_on_them_give_the_positions_back(flat: SensorDesign) -> None:
-    lights = [light for group in flat.lights.values() for light in group.lights]
-    heights: dict[int, float] = {}
-    for led, light in zip(placements(flat), lights, strict=True):
-        assert led.position == light.position
-        right, up, forward = frame_of(light.direction, None)
-        height = heights.setdefault(led.board, float(np.dot(light.position, forward)))
-        back = led.on_board[0] * right + led.on_board[1] * up + height * forward
-        np.testing.assert_allclose(back, light.position, atol=1e-9)
-    assert len(heights) == 3
-
-
-def test_leds_of_one_plane_share_a_board_and_others_do_not(flat: SensorDesign) -> None:
-    def board_of(*lights: Light) -> list[int]:
-        return [led.board for led in placements(with_lights(flat, *lights))]
-
-    here = Light(position=(0, 0, 5), direction=(0, 0, 1))
-    assert board_of(here, Light(position=(9, 4, 5), direction=(0, 0, 7))) == [1, 1]
-    assert board_of(here, Light(position=(9, 4, 5.5), direction=(0, 0, 1))) == [1, 2]
-    assert board_of(here, Light(position=(9, 4, 5), direction=(0, 0, -1))) == [1, 2]
-    assert board_of(here, Light(position=(9, 4, 5), direction=(0.1, 0, 1)), here) == [1, 2, 1]
-
-
 def test_the_table_reads_back(flat: SensorDesign) -> None:
     rows = list(csv.DictReader(io.StringIO(placement_csv(placements(flat)))))
     lights = [(name, light) for name, g in flat.lights.items() for light in g.lights]

@@ -60,6 +60,7 @@ def test_the_step_file(made: Made) -> None:
     text = path.read_text(errors="replace")
     assert len(text) < 1_000_000
     assert "OptiSense Studio" in text.split("ENDSEC")[0] and "'Author'" not in text
+    assert ".MILLI.,.METRE." in text.replace(" ", "")
     assert "COLOUR_RGB" in text and f"PRODUCT('{made.name}'" in text
     for shape in made.shapes:
         assert f"PRODUCT('{shape.name}'" in text

@@ -92,12 +92,19 @@ def test_a_saved_recipe_gives_the_same_design_from_elsewhere(cad: Any, tmp_path:
         "lights:\n  blue: {model: ws2812b, colour: [0, 0.2, 1], "
         "over: {file: leds.stl, towards: -x, patches: all}}\n"
         "  one: {model: smd-3528, colour: white, at: [{position: [0, 0, -9], "
-        "direction: [0, 0, 1]}]}\n",
+        "direction: [0, 0, 1]}]}\n"
+        "  table: {model: smd-3528, colour: green, "
+        "from: {file: leds.csv, units: mm, origin: [0, 0, -9]}}\n",
     )
-    recipe = read_recipe(cad.write(text))
+    text = text.replace("gel: {file: gel.stl,", "gel: {file: gel.stl, on: plate,")
+    file = cad.write(text)
+    (cad.folder / "leds.csv").write_text("Ref,PosX,PosY,Rot,Side\nD1,1,2,0,top\n")
+    recipe = read_recipe(file)
     save_recipe(recipe, tmp_path / "deep" / "down" / "recipe.yaml")
     again = read_recipe(tmp_path / "deep" / "down" / "recipe.yaml")
     assert_same(design_from_meshes(again).design, design_from_meshes(recipe).design)
+    (light,) = design_from_meshes(again).design.lights["table"].lights
+    assert light.position == pytest.approx((1.0, 2.0, -8.95))
     assert again.camera.up == recipe.camera.up and again.lights["one"] == recipe.lights["one"]
 
 

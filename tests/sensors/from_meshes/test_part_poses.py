@@ -14,7 +14,7 @@ from optisense import sensors
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.rotations import turn_about_axes
-from optisense.sensors.from_meshes import design_from_meshes, guess_recipe, read_recipe, save_recipe
+from optisense.sensors.from_meshes import design_from_meshes, guess_recipe
 from optisense.sensors.from_meshes._part_poses import laid_on, posed
 from optisense.sensors.from_meshes._pick_and_place import BoardPart, read_pick_and_place
 from optisense.sensors.from_meshes._strips import along, from_table
@@ -80,20 +80,6 @@ def test_a_recipe_moves_its_parts(cad: Cad) -> None:
     )
     assert sensors.check(made.design) == []
     assert made.design.provenance["parts.gel"].source == "CAD file gel.stl, laid on plate"
-
-
-def test_a_saved_recipe_makes_the_same_again(cad: Cad, tmp_path: Path) -> None:
-    (cad.folder).mkdir(exist_ok=True)
-    (cad.folder / "leds.csv").write_text("Ref,PosX,PosY,Rot,Side\nD1,1,2,0,top\n")
-    table = "from: {file: leds.csv, units: mm, origin: [0, 0, -9]}"
-    text = RECIPE.replace("row: {part: plate, side: +y, count: 4, pitch: 4.5}", table)
-    recipe = read_recipe(cad.write(text))
-    save_recipe(recipe, tmp_path / "elsewhere" / "again.yaml")
-    again = design_from_meshes(tmp_path / "elsewhere" / "again.yaml").design
-    first = design_from_meshes(recipe).design
-    assert again.lights == first.lights
-    assert again.lights["red"].lights[0].position == pytest.approx((1.0, 2.0, -8.95))
-    np.testing.assert_array_equal(again.meshes["gel"].vertices, first.meshes["gel"].vertices)
 
 
 @pytest.mark.parametrize(
