@@ -22,12 +22,10 @@ SMOOTH_EDGE = 3.0
 twenty triangles across a contact, which follow the outline of a smooth indenter."""
 FACET_TILT = 0.01
 """Error of slopes between the corners of a triangle in a contact, above which triangles are
-smaller. Shading normals vary linearly over triangles, so that facets of this error, half a degree,
-are not visible: on smooth indenters triangles may be larger than on textures."""
+smaller: half a degree, which is not visible as shading normals vary linearly over triangles."""
 EDGE_AT_RIM = 0.8
 """Greatest edge length within `RIM` of a contact's rim, in units of the grid's pitch. Slopes jump
-at the rim, and larger triangles would make it jagged. With half of it, the light at the rim of a
-ball changes by 0.9 % (RMS) in a picture 640 pixels wide."""
+at the rim, and larger triangles would make it jagged; half of it changes its light by 0.9 %."""
 RIM = 1.5
 """Distance from the rim, in units of the grid's pitch, within which triangles are finer: the slope
 jumps between two points of the grid, which lie within it."""
@@ -42,8 +40,7 @@ MAX_FACES = 600_000
 is left out."""
 BENT_SHARE = 0.1
 """Share of the greatest depth of a contact from which on inward-displaced skin around it counts as
-bent. Bent skin casts shadows and is lit like indenters; skin that bulges outward never counts as
-bent."""
+bent. Bent skin casts shadows and is lit like indenters."""
 
 
 class SkinState(IntEnum):

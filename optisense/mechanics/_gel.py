@@ -29,8 +29,7 @@ from optisense.mechanics._tangential_contact import Drag
 USUAL_GEL = Elasticity(youngs_modulus=0.435, poisson_ratio=0.49, friction=1.0)
 """Elastic constants of a gel whose material does not specify them: those of the GelSight Mini. Its
 modulus was fitted to measured forces (the FEATS project: Neo-Hooke, C10 = 0.0725 MPa, so E = 6
-C10). The Poisson ratio and the friction are assumptions, usual for silicone and for a matt
-coating."""
+C10); Poisson ratio and friction are assumptions."""
 
 DEEPEST_SHARE = 0.6
 """Largest depth, as a share of the gel's thickness, of the search for the depth of a given force.
@@ -59,13 +58,11 @@ COARSE_POINTS_ACROSS = 24
 """Number of grid points across the shorter side of a contact in coarse mode. The error of a ball's
 contact radius is then about 1 %, a fraction of a pixel of a draft."""
 COARSE_THICKNESS = 0.1
-"""Step (mm) of the thicknesses of layers in coarse mode: the kernels of a thickness take a tenth of
-a second to compute, and a slightly bent skin keeps its step; forces change by 1 to 2 % from step to
-step."""
+"""Step (mm) of the thicknesses of layers in coarse mode, whose kernels take a tenth of a second; a
+slightly bent skin keeps its step. Forces change by 1 to 2 % from step to step."""
 COARSE_EDGES = 2.0
-"""Factor on the edge lengths of the deformed skin in coarse mode, with which it has a fourth of the
-triangles. The error of a draft of GelSight Mini grows by 0.03 % of the mean light, and a draft
-takes 7 % less time while a cage point is dragged."""
+"""Factor on the edge lengths of the deformed skin in coarse mode. With a fourth of the triangles,
+the error of a draft grows by 0.03 % of the mean light, and it takes 7 % less time."""
 
 
 def _elastomers(design: SensorDesign) -> list[tuple[str, str, Elasticity]]:

@@ -42,8 +42,7 @@ FINER = 8
 GelSight Mini. Between the last point with skin and the next one, its border is that of its mesh."""
 NARROWEST = 0.02
 """Least distance of the border of the skin from a column, over the distance of columns, at which a
-column is added there: 0.03 mm on GelSight Mini. Nearer, the column moves to the border. With a
-tenth, forces change by 1 % from one case to the other."""
+column is added there; nearer, the column moves to the border. With a tenth, forces jump by 1 %."""
 LEAST_UPRIGHT = 0.5
 """Cosine of the steepest slope of the skin against the tangent plane that is modelled, 60 degrees;
 beyond it a dome's skin is too steep for columns over the tangent plane."""
@@ -53,8 +52,7 @@ face is tested. Lines leave the base of a gel nearly at right angles, and single
 their mean by up to 60 degrees; the skin itself, which is left out, faces them."""
 ASIDE = 1e-6
 """Distance by which the lines of columns at the border of the gel start inside of it, over the
-thickness: far above the rounding of double precision, which puts lines in the plane of a side on
-either side of it, and far below any distance that matters."""
+thickness: far above the rounding of double precision, and below any distance that matters."""
 LACKING = 4
 """Number of columns on skin whose lack of elements counts. Fewer are left out at some corners, such
 as those of the spherical GelSight Mini, where forces are smooth."""

@@ -21,7 +21,7 @@ Forces change by less than half of this share."""
 NEAR, NEARER = 0.75, 0.5
 """Distances of the loaded rectangle from the border of a flat gel, in thicknesses, between which
 the response changes from that of a flat layer to that of the elements. On GelSight Mini, their
-forces differ by 1.2 % at the farther one; nearer ones do not cost contacts more time."""
+forces differ by 1.2 % at the farther one."""
 MOST_KEPT = 12
 """Number of patches that are kept: nine places and some more. Each takes about 20 MB, and three
 times as much after a drag."""
@@ -30,9 +30,8 @@ STEP = 0.25
 several depths at one place share a patch."""
 THICKNESSES_PER_OCTAVE = 16
 """Number of thicknesses per factor of two of the flat layers to which gels of other shapes are
-compared, which are the next larger ones. With few of them, contacts at different places share the
-kernels of their layer. A softer layer also lets the iteration over pressure and shape converge
-where the free sides of a gel make it softer."""
+compared. With few of them, contacts at different places share the kernels of their layer. The next
+larger one is softer, so that the iteration converges where free sides make a gel softer."""
 SAME_PLACE = 6
 """Number of decimals (of mm) to which equal places agree: far below any distance that matters, and
 above the rounding of double precision."""

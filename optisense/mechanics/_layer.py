@@ -30,9 +30,8 @@ PANELS, PANEL_POINTS = 100, 8
 """Number of panels of the Gauss-Legendre rule of the Hankel transforms, and of points in each:
 twelve points for each oscillation of the Bessel function at `FARTHEST`."""
 FARTHEST = 20.0
-"""Distance over thickness beyond which displacements of the layer's surface are neglected.
-Displacements of a bonded layer decay exponentially with the distance; at ten thicknesses they are
-below 1e-4 of those at one."""
+"""Distance over thickness beyond which displacements of the layer's surface are neglected; at ten
+thicknesses, those of a bonded layer are below 1e-4 of those at one."""
 TABLE_POINTS = 1200
 """Number of entries of a table of distances from 0 to `FARTHEST`; a cubic spline through them is
 exact to 1e-6."""

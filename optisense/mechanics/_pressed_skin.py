@@ -17,11 +17,7 @@ from optisense.mechanics._footprint import Footprint
 from optisense.mechanics._gel_patch import GelPatch
 from optisense.mechanics._grid_spline import GridSpline, binned
 from optisense.mechanics._neighbours import OUTWARD, Neighbours
-from optisense.mechanics._normal_contact import (
-    TOLERANCE,
-    contact_area,
-    solve_normal_contact,
-)
+from optisense.mechanics._normal_contact import TOLERANCE, contact_area, solve_normal_contact
 from optisense.mechanics._relaxation import Relaxation
 
 SETTLED = 1e-4
@@ -29,15 +25,13 @@ SETTLED = 1e-4
 contacts has converged: below the tolerance of the pressure of a press of 0.8 mm."""
 UNSETTLED = 1e-3
 """Change (mm) of the displacements in the last iteration from which on the result is refused: a
-sixtieth of a pixel of GelSight Mini. Below it, an iteration may stall at the tolerance of the
-pressure; that under a plate as large as the gel ends at 1.3e-4."""
+sixtieth of a pixel of GelSight Mini. Below it, an iteration may stall at its tolerance."""
 FIRST_TOLERANCE = 0.01
 """Tolerance of the first pressure, solved before the correction for the gel's shape and the
 displacements due to other contacts are known; see `normal_contact.TOLERANCE`."""
 ROUGH_SHARE = 0.02
-"""Ratio of a pressure's tolerance to the last change (mm) of the correction for the gel's shape or
-of the displacements due to other contacts, so that each iteration is solved somewhat better than
-the next one changes it."""
+"""Ratio of a pressure's tolerance to the last change (mm) of what it is corrected by, so that each
+iteration is solved somewhat better than the next one changes it."""
 MAX_TURNS = 40
 """Number of iterations of the pressure, or the shear, and the correction for the gel's shape after
 which the solver fails. Most contacts take 2 to 5, a plate over a whole gel 8."""

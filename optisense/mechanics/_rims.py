@@ -18,12 +18,10 @@ from optisense.mechanics._gel_patch import GelPatch
 
 STEEP_RIM = 2.0
 """Distance (mm) of a contact from skin that is too steep for elements, below which forces are not
-reliable: on DIGIT, they change by up to 5 % in 0.1 mm at 1.8 mm, and the foot of the rim, where a
-real gel is held, moves by 0.4 mm at 1.5 mm."""
+reliable: on DIGIT, they change by up to 5 % in 0.1 mm at 1.8 mm."""
 LEFT_OUT = 0.85
 """Distance of the loads from skin without elements, in thicknesses, below which forces are not
-reliable: at the end of GelSight Svelte's skin, whose side leans under it, steps of 6 % in 0.25 mm
-begin at 0.81."""
+reliable: at the end of GelSight Svelte's skin, steps of 6 % in 0.25 mm begin at 0.81."""
 FREE_SIDE = 1.0
 """Distance (mm) of the middle of a contact from a free side of the gel, below which the error of
 the force is more than 4 %; measured with a ball of radius 1.5 mm on the pad of GelSight Mini."""

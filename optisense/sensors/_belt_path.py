@@ -12,9 +12,8 @@ from optisense.array_types import FloatArray
 from optisense.sensors._shapes import arc, pieces_of_arc
 
 BEND_PIECE = 1.0
-"""Largest angle of a piece of a bend, degrees. Between metal coatings, GelBelt's green light is
-guided around its wheels: with pieces of 4.5 degrees, an eighth less of it arrives in a contact in
-the middle of the view (specularity 1), and with 0.5 degrees, 1 % more."""
+"""Largest angle of a piece of a bend, degrees. Between metal coatings, light is guided around
+GelBelt's wheels: with pieces of 4.5 degrees, an eighth less green light arrives in a contact."""
 
 
 @dataclass(frozen=True)

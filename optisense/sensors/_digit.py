@@ -16,29 +16,14 @@ import numpy as np
 
 from optisense import library
 from optisense.array_types import FloatArray
-from optisense.design import (
-    Cage,
-    FaceFinish,
-    Light,
-    LightGroup,
-    Part,
-    Role,
-    SensorDesign,
-)
+from optisense.design import Cage, FaceFinish, Light, LightGroup, Part, Role, SensorDesign
 from optisense.design.colour import NAMED_COLOURS
 from optisense.geometry import TriangleMesh
 from optisense.sensors._digit_sources import provenance
 from optisense.sensors._half_round import HalfRound, stacked
 from optisense.sensors._led_flux import balanced_flux
 from optisense.sensors._shapes import axial_camera
-from optisense.sensors.dimensions import (
-    Dimensions,
-    Length,
-    Positive,
-    WholeNumber,
-    builds,
-    require,
-)
+from optisense.sensors.dimensions import Dimensions, Length, Positive, WholeNumber, builds, require
 
 NAME = "digit"
 GEL, WINDOW, HOUSING = "silicone-solaris", "acrylic", "black-plastic"
@@ -57,8 +42,7 @@ OPENING_GAP = 0.09
 
 CAVITY = (1.25, 2.5)
 """Room around the acrylic for the strip with the LEDs, mm: at its sides and round end, and at its
-straight end (a cavity of 20.8 x 30 mm).
-"""
+straight end (a cavity of 20.8 x 30 mm)."""
 
 HOUSING_WALL = 1.5
 """Thickness of wall and floor of the housing, mm, an assumption; no light passes the walls."""

@@ -17,14 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense import library
-from optisense.design import (
-    Absorber,
-    Dielectric,
-    LightGroup,
-    Part,
-    Role,
-    SensorDesign,
-)
+from optisense.design import Absorber, Dielectric, LightGroup, Part, Role, SensorDesign
 from optisense.design.colour import NAMED_COLOURS
 from optisense.geometry import TriangleMesh
 from optisense.sensors._belt_path import (

@@ -14,15 +14,7 @@ from typing import ClassVar
 import numpy as np
 
 from optisense import library
-from optisense.design import (
-    Absorber,
-    Dielectric,
-    Part,
-    Provenance,
-    Role,
-    SensorDesign,
-    Status,
-)
+from optisense.design import Absorber, Dielectric, Part, Provenance, Role, SensorDesign, Status
 from optisense.geometry import TriangleMesh
 from optisense.sensors._led_boards import (
     BOARDS,

@@ -32,13 +32,11 @@ FITTED_CAMERA = "gelsight-mini"
 
 VIEW_WIDTH = 20.3
 """Width of the skin that pictures of real units show, mm, from the size of balls in them; the
-maker's datasheet states 18.6.
-"""
+maker's datasheet states 18.6."""
 
 GUIDE_SIZE = 28.23, 23.73
 """Size of a light guide as large as the tray, mm: with one as large as the gel, pictures have a
-green border that no real unit shows.
-"""
+green border that no real unit shows."""
 
 
 def unfitted_design(

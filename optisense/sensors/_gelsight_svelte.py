@@ -18,15 +18,7 @@ import numpy as np
 from pydantic import SkipValidation
 
 from optisense import library
-from optisense.design import (
-    Cage,
-    Camera,
-    LightGroup,
-    Part,
-    Role,
-    SensorDesign,
-    Share,
-)
+from optisense.design import Cage, Camera, LightGroup, Part, Role, SensorDesign, Share
 from optisense.design.cage import as_points
 from optisense.design.colour import NAMED_COLOURS
 from optisense.errors import DesignError
@@ -35,21 +27,9 @@ from optisense.geometry.cage import cage_points
 from optisense.sensors._led_flux import balanced_flux
 from optisense.sensors._shapes import ribbon, row_of_lights, strip
 from optisense.sensors._svelte_body import LED, check_mirrors, housing, led_covers
-from optisense.sensors._svelte_profile import (
-    CurvedMirror,
-    FlatMirror,
-    Palm,
-    Points,
-)
+from optisense.sensors._svelte_profile import CurvedMirror, FlatMirror, Palm, Points
 from optisense.sensors._svelte_sources import provenance
-from optisense.sensors.dimensions import (
-    Dimensions,
-    Length,
-    Positive,
-    WholeNumber,
-    builds,
-    require,
-)
+from optisense.sensors.dimensions import Dimensions, Length, Positive, WholeNumber, builds, require
 
 NAME = "gelsight-svelte"
 GEL, MIRROR = "silicone-xp565", "mirror-silver"

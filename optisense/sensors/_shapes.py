@@ -26,8 +26,7 @@ ON_AXIS = 1e-12
 
 TWIST = 0.31
 """Angle by which turned shapes are rotated, in segments. No vertex then lies exactly on a plane of
-symmetry, where rays of regular grids would meet edges.
-"""
+symmetry, where rays of regular grids would meet edges."""
 
 ASIDE = 0.01
 """Distance by which a pole is moved off the axis, as a share of the next ring's radius."""

@@ -25,31 +25,26 @@ from optisense.geometry.rays import ray_hits
 
 FLUSH = 0.1
 """Largest depth in a part of the window of a light that lies against its face, mm. A flat window
-2 mm wide on a curved face of 10 mm radius reaches 0.05 mm deep.
-"""
+2 mm wide on a curved face of 10 mm radius reaches 0.05 mm deep."""
 
 SAMPLES = np.array(
     [(0, 0), (-1, -1), (0, -1), (1, -1), (1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0)], dtype=float
 )
 """Points (9, 2) of a window in half widths and half heights: the middle, then corners and middles
-of the edges.
-"""
+of the edges."""
 
 RAYS = (1, 16, 500)
 """Numbers of straight rays that are traced from a light, one after another until a ray reaches the
 sensor: along its axis, into a coarse and into a fine half sphere. Of the last, one falls into
-7 degrees x 7 degrees.
-"""
+7 degrees x 7 degrees."""
 
 DARK_WALL = 0.1
 """Largest reflectance of a wall from which no light counts; the black plastics of the library
-reflect 5 %, and a white housing lights a sensor by its reflections.
-"""
+reflect 5 %, and a white housing lights a sensor by its reflections."""
 
 TOGETHER = 1e-6
 """Distance, mm, within which a ray meets two parts at once, such as a gel and its skin; it covers
-rounding of numbers in files.
-"""
+rounding of numbers in files."""
 
 
 class WindowIn(NamedTuple):

@@ -14,8 +14,7 @@ from optisense.design.lights import frame_of
 
 SAME_PLANE = 0.01
 """Largest distance of LEDs' windows from one plane for which they may share a board, mm, if they
-face in one direction.
-"""
+face in one direction."""
 
 SAME_DIRECTION = 1e-3
 """Largest angle between directions that count as equal, radians: 0.06 degrees, the rounding of
@@ -23,13 +22,11 @@ directions that are written with three decimals."""
 
 FARTHEST = 15.0
 """Largest distance between neighbouring LEDs of one board, mm; rows of LEDs in such sensors have a
-pitch of 2 to 8 mm.
-"""
+pitch of 2 to 8 mm."""
 
 THICKEST = 6.0
 """Largest distance between the windows of LEDs back to back on one board, mm: twice the highest
-LEDs of the library (1.9 mm) and a board of 1.6 mm are 5.4.
-"""
+LEDs of the library (1.9 mm) and a board of 1.6 mm are 5.4."""
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,7 @@ Pair = tuple[int, str | float]
 
 HEADER = {"$ACADVER": (1, "AC1009"), "$INSUNITS": (70, "4"), "$MEASUREMENT": (70, "1")}
 """Variables of the header: the format of release 12, lengths in mm, and metric patterns. The last
-two are of later releases; those of release 12, which has no units, skip unknown variables.
-"""
+two are of later releases; those of release 12, which has no units, skip unknown variables."""
 
 
 def dxf(entities: Iterable[Sequence[Pair]]) -> str:

@@ -38,19 +38,16 @@ SAME_PLACE = 0.1
 
 RIGHT_SIDE = 0.5
 """Largest difference between a plate's ends and those of its mesh, as a share of its thickness,
-where that is less: a plate on the wrong side of its sheet is off by the whole thickness.
-"""
+where that is less: a plate on the wrong side of its sheet is off by the whole thickness."""
 
 
 WORTH_IT = 60
 """Smallest number of triangles for a recognition of shapes; a smaller mesh is written as it is,
-with its flat faces merged.
-"""
+with its flat faces merged."""
 
 MESH_ERROR = 0.015
 """Largest relative difference of a mesh's volume (or area) from that of the body; a circle of 24
-corners has 1.1 % less area, one of 48 0.3 %.
-"""
+corners has 1.1 % less area, one of 48 0.3 %."""
 
 
 def exact_body(shape: Shape) -> Any | None:

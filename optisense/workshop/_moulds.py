@@ -34,8 +34,7 @@ CLEARANCE = 0.15
 
 SPRUE, FUNNEL, VENT = 4.0, 8.0, 2.0
 """Diameters of the sprue at the gel, of its outer end, and of the vent, mm. Silicone flows through
-4 mm by its own weight. Where the gel's back is narrower, the holes are smaller.
-"""
+4 mm by its own weight. Where the gel's back is narrower, the holes are smaller."""
 
 NARROWER = 0.9
 """Factor by which a hole and its distance from the edge are reduced until there is room."""
@@ -45,18 +44,15 @@ FROM_EDGE = 0.5
 
 LEVELS = 64
 """Number of planes in the search for the parting plane, besides both ends of the gel; between two
-of them a gel hardly changes.
-"""
+of them a gel hardly changes."""
 
 DECIMALS = 9
 """Number of decimals of coordinates, mm, in the frame of pulling. A flat back is then exactly
-level, and no film of 1e-15 mm remains between it and the parting plane.
-"""
+level, and no film of 1e-15 mm remains between it and the parting plane."""
 
 SAME = 1e-3
 """Difference of undercuts, as a share of the gel's surface, and of outlines, as a share of the
-largest, that counts as none, so that the rounding of a mesh does not choose the plane.
-"""
+largest, that counts as none, so that the rounding of a mesh does not choose the plane."""
 
 UPRIGHT = 1e-6
 """Sine of the slope below which a face is upright and covers nothing: rounding of coordinates."""
@@ -69,8 +65,7 @@ UNDERCUT = 0.5
 
 LEAST_FACING = 0.2
 """Smallest length of the sum of the skin's normals, as a share of its area, for a direction of
-pulling; below it the skin points in all directions, as that of a belt.
-"""
+pulling; below it the skin points in all directions, as that of a belt."""
 
 SIDES = 48
 """Number of sides of round holes and pins, which are then 0.01 mm off the circle."""

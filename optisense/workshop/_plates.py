@@ -29,8 +29,7 @@ ROUND = 12
 
 SAME_RADIUS = 1e-4
 """Largest difference of the corners' distances from the middle of a round outline, mm; it covers
-rounding in files.
-"""
+rounding in files."""
 
 ON_AXIS = 1e-9
 """Largest difference from 1 of a unit normal's component along the axis that it is parallel to."""

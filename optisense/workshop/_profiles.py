@@ -25,13 +25,11 @@ more count as circles."""
 
 SMOOTH_SAGITTA = 0.05
 """Largest distance of a smooth curve from the sides of its polygon, mm; five times the tolerance of
-a good export. Long sides that stand farther from any curve through their corners are meant flat.
-"""
+a good export. Long sides that stand farther from any curve through their corners are meant flat."""
 
 ALIKE = 2.0
 """Largest ratio of the lengths of neighbouring sides of a smooth curve. Corners on curves come in
-steady steps; a longer side beside them is a straight one, such as that of a mitred corner.
-"""
+steady steps; a longer side beside them is a straight one, such as that of a mitred corner."""
 
 CURVE_CORNERS = 6
 """Smallest number of corners in a smooth run that make a curve: one more than for an arc, whose

@@ -24,8 +24,7 @@ FEWEST_CORNERS = 12
 
 NEAR_AXIS = 0.05
 """Largest distance from the axis of a single vertex that counts as a pole, as a share of the
-largest radius; poles may be moved off the axis.
-"""
+largest radius; poles may be moved off the axis."""
 
 
 FEWEST_IN_RING = 8

@@ -12,13 +12,11 @@ from optisense.geometry.solids import as_manifold, of_manifold
 
 LONGEST_MITRE = 3.0
 """Largest distance of a corner of the far face from the near one, in thicknesses; the mitre of two
-faces at 40 degrees to one another is 2.9 times as long.
-"""
+faces at 40 degrees to one another is 2.9 times as long."""
 
 SAME_NORMAL = 1e-9
 """Squared ratio to the largest singular value below which normals count as dependent: two faces at
-less than 0.002 degrees to one another are one plane.
-"""
+less than 0.002 degrees to one another are one plane."""
 
 
 def thickened(mesh: TriangleMesh, thickness: float) -> TriangleMesh | None:

@@ -9,15 +9,7 @@ import math
 import pytest
 
 from optisense import sensors
-from optisense.design import (
-    Conductor,
-    Dielectric,
-    LightGroup,
-    Part,
-    Provenance,
-    Role,
-    SensorDesign,
-)
+from optisense.design import Conductor, Dielectric, LightGroup, Part, Provenance, Role, SensorDesign
 from optisense.geometry import TriangleMesh
 from optisense.workshop import bill_of_materials
 from optisense.workshop._bill_of_materials import Item

@@ -33,23 +33,18 @@ WIDTH = 320
 
 WIDEST_FIT = 100.0
 """Largest field of view that is used to place a camera, degrees: a wider camera is placed as if it
-saw this much, so that its rim is not needed.
-"""
+saw this much, so that its rim is not needed."""
 
 CLEARANCE = 1.0
 """Distance that an automatically placed camera keeps from the parts in front of it, mm."""
 
 LARGEST_STEP_BACK = 200.0
 """Largest distance that an automatically placed camera steps back in search of a view, mm; no
-tactile sensor is longer.
-"""
+tactile sensor is longer."""
 
 LITTLE_SEEN = 0.5
-"""Share of the area of the sensing surface that the camera sees below which `new` notes it. The
-built-in sensors have 0.51 (GelBelt) and more by this estimate, which neglects refraction. It is
-larger than `LEAST_SKIN` (0.25), below which `check` warns and scores refuse: a camera that has just
-been placed is easily moved.
-"""
+"""Share of the area of the sensing surface that the camera sees below which `new` notes it. It is
+larger than `LEAST_SKIN` (0.25), below which `check` warns: a new camera is easily moved."""
 
 
 def place_lights(state: RecipeState, name: str, choice: LightChoice) -> LightGroup:

@@ -20,8 +20,7 @@ from optisense.sensors.from_meshes.recipe_lights import FromTable, LightsAlong
 
 ROUND = 30.0
 """Largest angle between sides of an outline that count as pieces of a curve, degrees; lights on
-them point as on the curve.
-"""
+them point as on the curve."""
 
 MISFIT = 0.2
 """Largest difference between distances of points on the board and in the sensor, mm."""

@@ -36,11 +36,7 @@ from optisense.sensors.from_meshes._placement import (
     view_note,
 )
 from optisense.sensors.from_meshes._recipe_state import RecipeState
-from optisense.sensors.from_meshes._touching import (
-    lay_on_elastomer,
-    look_inward,
-    settle_contacts,
-)
+from optisense.sensors.from_meshes._touching import lay_on_elastomer, look_inward, settle_contacts
 from optisense.sensors.from_meshes.files import refuse_odd_units
 from optisense.sensors.from_meshes.recipe import Recipe, read_recipe
 from optisense.sensors.from_meshes.surfaces import chosen
@@ -53,9 +49,8 @@ USUAL_MATERIAL = {
 """Materials of parts for which the recipe names none; they are marked as assumed."""
 
 MOST_CUT = 200_000
-"""Largest number of triangles of a part that is cut by `cut_every`; the largest part of a built-in
-sensor has an eighth of them, and a pad of 20 mm has them if it is cut every 0.1 mm.
-"""
+"""Largest number of triangles of a part that is cut by `cut_every`: eight times that of the largest
+part of a built-in sensor."""
 
 
 @dataclass

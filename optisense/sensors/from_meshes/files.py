@@ -31,13 +31,11 @@ SMALLEST, LARGEST = 4.0, 400.0
 
 ODD_PART = 200.0
 """Ratio of sizes from which on a part that is smaller or larger than the others is taken to be in
-another unit.
-"""
+another unit."""
 
 SMALL_PART = 15.0
 """Ratio of sizes from which on a part that is smaller or larger than the others is reported, since
-it may be in another unit.
-"""
+it may be in another unit."""
 
 
 COMMON_UNITS = tuple(unit for unit in MM_PER if unit != "mil")

@@ -71,8 +71,7 @@ KINDS = {
     "barrel", "case", "cover", "enclosure", "frame", "holder", "housing", "mount",
 }  # fmt: skip
 """Words for kinds of bodies: words before them say what they are for, as in lens holder. Boards and
-plates are not among them: lights are placed on a board of LEDs, and a plate may be of anything.
-"""
+plates are not among them: lights are placed on a board of LEDs, and a plate may be of anything."""
 
 CLEAR = {"acrylic", "clear", "glass", "pmma", "transparent"}
 """Words that tell a clear body also before a word for its kind, as in clear cover."""

@@ -34,8 +34,7 @@ Pixels = Annotated[Count, Field(le=65_536)]
 
 SMALLEST_FOV = 0.1
 """Smallest field of view of a camera whose position is to be found, degrees; one with a smaller
-field of view would stand half a kilometre away from the skin.
-"""
+field of view would stand half a kilometre away from the skin."""
 
 
 class CameraChoice(Model):

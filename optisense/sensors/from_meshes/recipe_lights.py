@@ -16,10 +16,8 @@ from optisense.sensors.from_meshes.directions import Direction, Side, Way, or_wo
 from optisense.sensors.from_meshes.recipe_parts import ShapeReference, Turn
 
 USUAL_FLUX = 10.0
-"""Flux of each light if neither the recipe nor the library states one, mW; a bright LED of a few
-millimetres at its nominal current. Pictures are exposed automatically, so that only the ratios of
-the groups matter, unless the exposure is fixed.
-"""
+"""Flux of each light if neither the recipe nor the library states one, mW: that of a bright LED.
+Only the ratios of the groups matter to a picture whose exposure is automatic."""
 
 Lights = Annotated[Count, Field(le=MOST_LIGHTS)]
 

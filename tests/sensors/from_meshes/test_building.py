@@ -23,12 +23,7 @@ from optisense.design import (
 from optisense.errors import DesignError
 from optisense.geometry.containment import inside
 from optisense.sensors import check, save_design
-from optisense.sensors.from_meshes import (
-    design_from_meshes,
-    guess_recipe,
-    read_recipe,
-    save_recipe,
-)
+from optisense.sensors.from_meshes import design_from_meshes, guess_recipe, read_recipe, save_recipe
 from optisense.sensors.from_meshes.files import Use
 from optisense.sensors.from_meshes.guessing import guess_use
 from optisense.workshop import export
