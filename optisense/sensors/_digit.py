@@ -21,8 +21,8 @@ from optisense.design.colour import NAMED_COLOURS
 from optisense.geometry import TriangleMesh
 from optisense.sensors._digit_sources import provenance
 from optisense.sensors._half_round import HalfRound, stacked
-from optisense.sensors._led_flux import balanced_flux
 from optisense.sensors._shapes import axial_camera
+from optisense.sensors._sources import balanced_flux
 from optisense.sensors.dimensions import Dimensions, Length, Positive, WholeNumber, builds, require
 
 NAME = "digit"

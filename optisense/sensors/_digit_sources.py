@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from optisense.design import Provenance, Status
-from optisense.sensors._led_flux import BALANCED
-from optisense.sensors._sources import provenance_of
+from optisense.sensors._sources import FLUXES, provenance_of
 
 
 def provenance(frosted: Iterable[str]) -> dict[str, Provenance]:
@@ -40,12 +39,8 @@ def provenance(frosted: Iterable[str]) -> dict[str, Provenance]:
             f"opening of 18.58 x 25.19 mm and cavity of 20.8 x 30 mm {cad}; its height, its walls "
             "and where the acrylic lies in it are assumed",
         ),
-        "lights.red": (derived, row),
-        "lights.green": (derived, row),
-        "lights.blue": (derived, row),
-        "lights.red.flux": (derived, BALANCED),
-        "lights.green.flux": (assumed, "as red"),
-        "lights.blue.flux": (assumed, "as red"),
+        **{f"lights.{colour}": (derived, row) for colour in ("red", "green", "blue")},
+        **FLUXES,
         "camera.position": (
             sourced,
             "pupil 21.7 mm under the top of the gel (configuration of the simulator TACTO; a "

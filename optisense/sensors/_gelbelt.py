@@ -37,8 +37,8 @@ from optisense.sensors._gelbelt_checks import (
     check_wheels,
 )
 from optisense.sensors._gelbelt_sources import gelbelt_sources
-from optisense.sensors._led_flux import nominal_flux
 from optisense.sensors._shapes import axial_camera, ribbon, rod, row_of_lights, strip
+from optisense.sensors._sources import nominal_flux
 from optisense.sensors.dimensions import (
     Dimensions,
     Length,

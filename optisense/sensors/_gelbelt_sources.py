@@ -77,9 +77,7 @@ def gelbelt_sources(
             "black, and drawn for a quarter turn only: light that gets there does not come back",
         ),
         "parts.far-coat.thickness": (assumed, "0.1 mm, usual for a sprayed coat of silicone"),
-        "lights.red": (assumed, row),
-        "lights.green": (assumed, row),
-        "lights.blue": (assumed, row),
+        **{f"lights.{colour}": (assumed, row) for colour in ("red", "green", "blue")},
         "lights.red.flux": (
             assumed,
             "a third of green, dimmed with resistors; only ratios matter to an auto-exposed "

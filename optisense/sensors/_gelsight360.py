@@ -25,9 +25,8 @@ from optisense.sensors._led_boards import (
     LedBoards,
     ring,
 )
-from optisense.sensors._led_flux import BALANCED, balanced_flux
 from optisense.sensors._shapes import axial_camera, revolve
-from optisense.sensors._sources import XP565, provenance_of
+from optisense.sensors._sources import BALANCED, XP565, balanced_flux, provenance_of
 from optisense.sensors._tip_shape import TipShape
 from optisense.sensors.dimensions import (
     Dimensions,

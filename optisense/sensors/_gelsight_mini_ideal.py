@@ -27,8 +27,8 @@ from optisense.design import (
 from optisense.design.colour import NAMED_COLOURS
 from optisense.geometry import TriangleMesh
 from optisense.sensors._gelsight_mini_sources import provenance
-from optisense.sensors._led_flux import balanced_flux
 from optisense.sensors._shapes import axial_camera, row_of_lights
+from optisense.sensors._sources import balanced_flux
 from optisense.sensors.dimensions import (
     Dimensions,
     Length,

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from optisense.design import Provenance, Status
-from optisense.sensors._led_flux import BALANCED
-from optisense.sensors._sources import XP565, provenance_of
+from optisense.sensors._sources import FLUXES, XP565, provenance_of
 
 
 def provenance() -> dict[str, Provenance]:
@@ -34,12 +33,8 @@ def provenance() -> dict[str, Provenance]:
         "parts.skin": (sourced, "top face of the gel"),
         "parts.tray": (sourced, f"28.23 x 23.73 x 1 mm from the {cad}; its material is assumed"),
         "parts.guide": (assumed, "25.25 x 20.75 x 4 mm acrylic, in optical contact with the tray"),
-        "lights.red": (assumed, order),
-        "lights.green": (assumed, order),
-        "lights.blue": (assumed, order),
-        "lights.red.flux": (Status.DERIVED, BALANCED),
-        "lights.green.flux": (assumed, "as red"),
-        "lights.blue.flux": (assumed, "as red"),
+        **{f"lights.{colour}": (assumed, order) for colour in ("red", "green", "blue")},
+        **FLUXES,
         "camera.position": (assumed, "pupil 17 mm behind the back of the tray"),
         "camera.fov": (
             Status.DERIVED,

@@ -24,8 +24,8 @@ from optisense.design.colour import NAMED_COLOURS
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.cage import cage_points
-from optisense.sensors._led_flux import balanced_flux
 from optisense.sensors._shapes import ribbon, row_of_lights, strip
+from optisense.sensors._sources import balanced_flux
 from optisense.sensors._svelte_body import LED, check_mirrors, housing, led_covers
 from optisense.sensors._svelte_profile import CurvedMirror, FlatMirror, Palm, Points
 from optisense.sensors._svelte_sources import provenance
@@ -169,24 +169,13 @@ def gelsight_svelte(size: GelSightSvelteDimensions) -> SensorDesign:
         parts={
             "skin": Part(role=Role.SENSING_SURFACE, mesh="meshes/skin.obj"),
             "gel": Part(role=Role.ELASTOMER, mesh="meshes/gel.obj", material=GEL, priority=1),
-            "M1": Part(
-                role=Role.MIRROR,
-                mesh="meshes/M1.obj",
-                material=MIRROR,
-                thickness=size.mirror_thickness,
-            ),
-            "M2": Part(
-                role=Role.MIRROR,
-                mesh="meshes/M2.obj",
-                material=MIRROR,
-                thickness=size.mirror_thickness,
-            ),
-            "body": Part(role=Role.BLOCKER, mesh="meshes/body.obj", thickness=size.wall_thickness),
             **{
-                name: Part(
-                    role=Role.BLOCKER, mesh=f"meshes/{name}.obj", thickness=size.wall_thickness
+                name: Part(role=role, mesh=f"meshes/{name}.obj", material=material, thickness=thick)
+                for role, material, thick, names in (
+                    (Role.MIRROR, MIRROR, size.mirror_thickness, ("M1", "M2")),
+                    (Role.BLOCKER, None, size.wall_thickness, ("body", "side-walls", "led-covers")),
                 )
-                for name in ("side-walls", "led-covers")
+                for name in names
             },
         },
         lights=_lights(palm, size, led_flux),

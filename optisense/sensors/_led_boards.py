@@ -12,7 +12,7 @@ from optisense.design import AreaEmitter, Light, LightGroup
 from optisense.design.posing import triple
 from optisense.geometry import TriangleMesh
 from optisense.geometry.rotations import rotation
-from optisense.sensors._led_flux import package
+from optisense.sensors._sources import package
 
 COLOURS = {"R": (1.0, 0.0, 0.0), "G": (0.0, 1.0, 0.0), "B": (0.0, 0.0, 1.0)}
 """Shares of red, green and blue in the light of each colour."""

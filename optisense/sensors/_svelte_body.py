@@ -11,8 +11,8 @@ import shapely
 from optisense.array_types import FloatArray
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
-from optisense.sensors._led_flux import package
 from optisense.sensors._shapes import ribbon
+from optisense.sensors._sources import package
 from optisense.sensors._svelte_profile import CurvedMirror, FlatMirror, Palm, Points
 
 LED = "smd-3528"

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from optisense.design import Provenance, Status
-from optisense.sensors._led_flux import BALANCED
-from optisense.sensors._sources import XP565, provenance_of
+from optisense.sensors._sources import BALANCED, XP565, provenance_of
 
 ANIMATION = (
     "side view in an animation on the first author's web site, digitised to about 1 pixel at an "

@@ -53,11 +53,8 @@ class Dimensions(BaseModel):
     sensor: ClassVar[str]
 
     def describe(self, design: SensorDesign, mentioned: tuple[str, ...] = ()) -> None:
-        """Add to a design's description which dimensions differ from their defaults.
-
-        Args:
-            design: design that was built.
-            mentioned: names of dimensions that the description mentions already.
+        """Add to a design's description which dimensions differ from their defaults, but for those
+        that it mentions already; see `describe_changes`.
         """
         defaults = {name: field.default for name, field in type(self).model_fields.items()}
         given = {name: getattr(self, name) for name in self.model_fields_set}

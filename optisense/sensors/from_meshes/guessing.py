@@ -20,7 +20,7 @@ from optisense.geometry import TriangleMesh
 from optisense.geometry.joining import touching_area
 from optisense.geometry.patches import faces_towards
 from optisense.length_units import Units
-from optisense.sensors._led_flux import balanced_flux
+from optisense.sensors._sources import balanced_flux
 from optisense.sensors.from_meshes.directions import SIDES, nearest_side, vector
 from optisense.sensors.from_meshes.files import (
     ALL_FORMATS,
