@@ -22,39 +22,39 @@ the middle of the picture: only their ratio counts."""
 def mjcf(body: SensorBody, folder: str) -> str:
     """Return the text of an MJCF file with its mesh files (binary STL, m) in a folder beside it."""
     model = Element("mujoco", model=body.name)
-    SubElement(model, "compiler", angle="radian", meshdir=folder)
-    asset = SubElement(model, "asset")
+    child(model, "compiler", angle="radian", meshdir=folder)
+    asset = child(model, "asset")
     for each in [*body.looks, *body.hulls]:
         # A sheet has no volume, of which MuJoCo would otherwise compute the inertia.
         shell = {} if each.is_closed else {"inertia": "shell"}
-        SubElement(asset, "mesh", name=each.name, file=f"{each.name}.stl", **shell)
-    sensor = SubElement(SubElement(model, "worldbody"), "body", name=body.name)
+        child(asset, "mesh", name=each.name, file=f"{each.name}.stl", **shell)
+    sensor = child(child(model, "worldbody"), "body", name=body.name)
     inertia = numbers(body.inertia[i, j] for i, j in _UPPER)
     at = {"pos": numbers(body.centre), "mass": f"{body.mass:.9g}", "fullinertia": inertia}
-    SubElement(sensor, "inertial", at)
+    child(sensor, "inertial", **at)
     for each in body.looks:
         shown = {"group": "2", "contype": "0", "conaffinity": "0", "mass": "0"}
         colour = numbers(each.colour)
-        SubElement(sensor, "geom", type="mesh", mesh=each.name, **shown, rgba=colour)
+        child(sensor, "geom", type="mesh", mesh=each.name, **shown, rgba=colour)
     for each in body.hulls:
         # Of two geoms, the one of higher priority gives the friction; else, the larger counts.
         gel = {"friction": f"{body.friction:g} 0.005 0.0001", "priority": "1"}
         touched = {"group": "3", "mass": "0", **(gel if each.is_gel else {})}
-        SubElement(sensor, "geom", name=each.name, type="mesh", mesh=each.name, **touched)
+        child(sensor, "geom", name=each.name, type="mesh", mesh=each.name, **touched)
     right, down, _ = body.camera.axes.T
     width, height = body.resolution
     pose = {"pos": numbers(body.camera.origin), "xyaxes": numbers((*right, *-down))}
     size = {"resolution": f"{width} {height}"}
-    SubElement(sensor, "camera", name="camera", **pose, **_view(body), **size)
+    child(sensor, "camera", name="camera", **pose, **_view(body), **size)
     skin, (middle, half) = body.skin, body.skin_box
     axes = numbers((*skin.axes[:, 0], *skin.axes[:, 1]))
     pose = {"pos": numbers(skin.origin), "xyaxes": axes}
-    SubElement(sensor, "site", name="skin", **pose, size="0.0005", group="4")
+    child(sensor, "site", name="skin", **pose, size="0.0005", group="4")
     pose = {"pos": numbers(skin.origin + skin.axes @ middle), "xyaxes": axes}
     box = numbers(np.maximum(half + LEAST_HALF_SIDE, LEAST_HALF_SIDE))
     touched = {"type": "box", **pose, "size": box, "group": "4", "rgba": "0 0 0 0"}
-    SubElement(sensor, "site", name="touched", **touched)
-    SubElement(SubElement(model, "sensor"), "touch", name="normal_force", site="touched")
+    child(sensor, "site", name="touched", **touched)
+    child(child(model, "sensor"), "touch", name="normal_force", site="touched")
     return xml_text(model)
 
 
@@ -70,7 +70,11 @@ def _view(body: SensorBody) -> dict[str, str]:
     size = SENSOR_HEIGHT * np.array([width / height, 1.0])
     focal = 0.5 * SENSOR_HEIGHT / np.tan(np.radians(0.5 * body.camera_angle))
     principal = size * (0.5 - np.array([across, down]))
-    values = {"sensorsize": size, "focal": (focal, focal), "principal": principal}
+    values: dict[str, Iterable[float]] = {
+        "sensorsize": size,
+        "focal": (focal, focal),
+        "principal": principal,
+    }
     return {name: numbers(value) for name, value in values.items()}
 
 
@@ -81,6 +85,11 @@ _UPPER = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 def numbers(values: Iterable[float]) -> str:
     """Return numbers with nine digits, separated by spaces; tiny ones that are rounding are 0."""
     return " ".join(f"{0.0 if abs(value) < 1e-15 else value:.9g}" for value in values)
+
+
+def child(parent: Element, tag: str, **attributes: str) -> Element:
+    """Return a new element in another one."""
+    return SubElement(parent, tag, attributes)
 
 
 def xml_text(root: Element) -> str:

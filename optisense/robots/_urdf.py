@@ -35,11 +35,11 @@ def urdf(body: SensorBody, folder: str) -> str:
     for end, frame in (("camera_optical_frame", body.camera), ("skin", body.skin)):
         # A link without a body, and the joint that fixes it. Roll, pitch and yaw are rotations
         # about the fixed axes x, y and z, in this order.
-        child = f"{body.name}_{end}"
-        SubElement(robot, "link", name=child)
-        joint = SubElement(robot, "joint", name=f"{child}_joint", type="fixed")
+        name = f"{body.name}_{end}"
+        SubElement(robot, "link", name=name)
+        joint = SubElement(robot, "joint", name=f"{name}_joint", type="fixed")
         SubElement(joint, "parent", link=body.name)
-        SubElement(joint, "child", link=child)
+        SubElement(joint, "child", link=name)
         angles = Rotation.from_matrix(frame.axes).as_euler("xyz")
         SubElement(joint, "origin", xyz=numbers(frame.origin), rpy=numbers(angles))
     return '<?xml version="1.0"?>\n' + xml_text(robot)

@@ -13,8 +13,8 @@ from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.coincidence import cut, find_coincident
 from optisense.geometry.joining import EXACT, join, touching_area
-from optisense.geometry.overlaps import find_overlap
 from optisense.geometry.mesh_points import distance_within
+from optisense.geometry.overlaps import find_overlap
 from optisense.geometry.solids import as_manifold
 from optisense.sensors.from_meshes.recipe import Recipe
 
