@@ -38,14 +38,10 @@ class GridResponse:
         elasticity: Elasticity,
         farthest: tuple[int, int] | None = None,
     ) -> None:
-        """Set the grid.
+        """Set the grid, whose rows follow y and columns follow x; lengths in mm.
 
-        Args:
-            shape: (rows, columns); rows follow y and columns follow x.
-            pitch: side of a square, mm.
-            thickness: thickness of the layer, mm.
-            farthest: largest number of rows and of columns between a loaded square and any square
-                of the grid; without it, all squares may be loaded.
+        ``farthest`` is the largest number of rows and of columns between a loaded square and any
+        square of the grid; without it, all squares may be loaded.
         """
         self.shape, self.pitch = shape, pitch
         self._load = SquareLoad(

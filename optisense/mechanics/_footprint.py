@@ -94,17 +94,11 @@ def footprint(
     thickness: float,
     points_across: int = POINTS_ACROSS,
 ) -> Footprint:
-    """Return the overlap of a placed indenter with the skin.
+    """Return the overlap of a placed indenter, with shading normals if its exact shape is smooth,
+    and the undeformed sensing surface around a spot of it.
 
-    Args:
-        indenter: the placed mesh of the indenter in the design's frame (mm), with shading normals
-            if its exact shape is smooth.
-        skin: the undeformed sensing surface, in the same frame.
-        spot: the place of the contact on the skin.
-        depth: depth of the contact, mm.
-        thickness: thickness of the gel there, mm.
-        points_across: number of grid points across the shorter side of the overlap, within the
-            bounds on their distance (`FINEST_PITCH`, `COARSEST_PITCH`).
+    Points across the shorter side of the overlap are as many as asked for, within the bounds on
+    their distance (`FINEST_PITCH`, `COARSEST_PITCH`). Meshes are in the design's frame, mm.
 
     Raises:
         NoFootprintError: indenter and skin do not overlap, or between the points of the grid only.

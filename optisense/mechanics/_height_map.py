@@ -20,20 +20,13 @@ tested for whether they lie on a triangle: far above the rounding of double prec
 
 
 def heights(mesh: TriangleMesh, x: FloatArray, y: FloatArray, highest: bool = False) -> FloatArray:
-    """Return the lowest (or highest) z of a mesh at each point of a regular grid.
+    """Return the lowest (or highest) z (rows, columns), mm, of a mesh at each point of a regular
+    grid with ascending coordinates x (columns,) and y (rows,); infinity (minus infinity for the
+    highest) where there is no triangle.
 
     If the mesh has shading normals, heights follow a quadratic surface through each triangle:
     half-way from the triangle to the tangent planes of its corners, weighted by barycentric
     coordinates. This is exact for paraboloids, and continuous across edges.
-
-    Args:
-        mesh: the mesh (mm), with z as the height. Its shading normals are used if it has any.
-        x, y: (columns,) and (rows,) grid coordinates (mm), ascending with a constant pitch.
-        highest: whether the highest z is returned instead of the lowest.
-
-    Returns:
-        Heights (rows, columns), mm; infinity (minus infinity for the highest) where there is no
-        triangle.
     """
     sign = -1.0 if highest else 1.0
     result = np.full(len(x) * len(y), np.inf)
@@ -111,15 +104,10 @@ def _counted(
 
 
 def slopes(height: FloatArray, pitch: float, apart: int = 1) -> tuple[FloatArray, FloatArray]:
-    """Return the slopes of heights by x and by y, from the points on both sides with a height.
+    """Return the slopes of heights (rows, columns), mm, NaN where there is none, by x and by y.
 
-    Args:
-        height: (rows, columns) heights, mm; NaN where there is none.
-        pitch: distance (mm) of these points, which are ``apart`` steps of the grid.
-
-    Returns:
-        The slopes, (rows, columns) each: the mean of the slopes to both sides, the slope to the
-        only one with a height, or NaN where there is none.
+    They are the mean of the slopes to the points on both sides, at a pitch (mm) of some steps of
+    the grid, the slope to the only one with a height, or NaN where there is none.
     """
     found = []
     for along in (height.T, height):

@@ -57,15 +57,11 @@ class Compliance(NamedTuple):
 
 
 def layer_compliance(wave_number: ArrayLike, poisson_ratio: float) -> Compliance:
-    """Return the compliances (...) of a bonded layer of thickness 1.
+    """Return the compliances (...) of a bonded layer of thickness 1 by the product q h (...).
 
     With a = q h and k = 3 - 4 nu, all but `across` share the denominator k cosh 2a + 2 a^2 + (k^2 +
     1) / 2; their numerators are (1 - nu) (k sinh 2a - 2a), (1 - nu) (k sinh 2a + 2a) and (k (k - 1)
     (cosh 2a - 1) / 2 - 2 a^2) / 2. `across` is tanh a.
-
-    Args:
-        wave_number: (...) the product q h, 0 or more.
-        poisson_ratio: Poisson's ratio, below 0.5.
     """
     a = np.asarray(wave_number, dtype=np.float64)
     k = 3.0 - 4.0 * poisson_ratio
@@ -140,17 +136,11 @@ def layer_correction(distance: FloatArray, poisson_ratio: float) -> FloatArray:
 
 
 def surface_displacement(x: FloatArray, y: FloatArray, poisson_ratio: float) -> FloatArray:
-    """Return the displacement along the surface of a bonded layer by point forces.
+    """Return the displacement (2, 3, ...), mm, along x and y of the surface of a bonded layer by 1
+    N along x, along y and into the layer, for a thickness of 1 mm and a shear modulus of 1 MPa.
 
-    At the force itself the infinite part, which is the half-space's, is left out.
-
-    Args:
-        x, y: (...) position relative to the force along the surface, in thicknesses.
-        poisson_ratio: Poisson's ratio, below 0.5.
-
-    Returns:
-        The displacement (2, 3, ...), mm, along x and y by 1 N along x, along y and into the layer,
-        for a thickness of 1 mm and a shear modulus of 1 MPa.
+    Positions x and y (...) are relative to the force, in thicknesses. At the force itself the
+    infinite part, which is the half-space's, is left out.
     """
     nu, splines = poisson_ratio, _corrections(poisson_ratio)
     r = np.hypot(x, y)

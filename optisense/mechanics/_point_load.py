@@ -21,13 +21,8 @@ SWAPPED = [1, 0, 2]
 
 
 def displacements(offsets: FloatArray, poisson_ratio: float, axis: int = INTO) -> FloatArray:
-    """Return the displacements (..., 3), mm, by a force of 1 N along an axis, for a shear modulus
-    of 1 MPa.
-
-    Args:
-        offsets: (..., 3) positions relative to the load, mm; z points into the half-space.
-        poisson_ratio: Poisson's ratio of the half-space.
-        axis: axis of the force.
+    """Return the displacements (..., 3), mm, at positions (..., 3), mm, relative to a force of 1 N
+    along an axis, for a shear modulus of 1 MPa; z points into the half-space.
     """
     if axis == 1:
         return displacements(offsets[..., SWAPPED], poisson_ratio, 0)[..., SWAPPED]
@@ -117,14 +112,8 @@ def _gradients_along(offsets: FloatArray, poisson_ratio: float) -> FloatArray:
 def tractions(
     offsets: FloatArray, normals: FloatArray, poisson_ratio: float, axis: int = INTO
 ) -> FloatArray:
-    """Return the tractions (..., 3), MPa, on planes, by a force of 1 N along an axis, for any shear
-    modulus.
-
-    Args:
-        offsets: (..., 3) positions relative to the load, mm; z points into the half-space.
-        normals: (..., 3) normals of the planes.
-        poisson_ratio: Poisson's ratio of the half-space.
-        axis: axis of the force.
+    """Return the tractions (..., 3), MPa, on planes with normals (..., 3), by a force of 1 N along
+    an axis, for any shear modulus; positions are those of `displacements`.
     """
     share = 2.0 * poisson_ratio / (1.0 - 2.0 * poisson_ratio)
     if axis != INTO:

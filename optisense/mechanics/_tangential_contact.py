@@ -46,22 +46,15 @@ def solve_shear(
     wanted: FloatArray,
     start: FloatArray | None = None,
 ) -> FloatArray:
-    """Solve for the shear on a skin that sticks to an indenter where friction suffices, and slips
-    elsewhere.
+    """Return the shear (2, rows, columns), MPa, on a skin under a pressure (rows, columns) that
+    sticks to an indenter where friction suffices, and slips elsewhere.
 
     The shear is nowhere larger than friction times pressure. Where it is smaller, the skin has
     moved with the indenter; where it is equal, the skin has moved less, and the shear points along
     the difference. This minimises a convex energy; the method is an accelerated projected gradient
     (Beck and Teboulle, SIAM J. Imaging Sci. 2, 2009) with restarts. The effect of shear on the
-    pressure is neglected, as usual; it vanishes for an incompressible half-space.
-
-    Args:
-        pressure: (rows, columns) pressure, MPa.
-        wanted: (2, rows, columns) displacement of the indenter along x and y, mm.
-        start: (2, rows, columns) initial shear, MPa.
-
-    Returns:
-        The shear (2, rows, columns), MPa, on the skin.
+    pressure is neglected, as usual; it vanishes for an incompressible half-space. The indenter
+    moves as ``wanted`` (2, rows, columns), mm.
 
     Raises:
         ContactError: the iteration does not converge.

@@ -18,13 +18,9 @@ def gelbelt_sources(
 ) -> dict[str, Provenance]:
     """Return the provenance of a GelBelt with one of its light designs.
 
-    No light reaches the return of the belt, which is not modelled: half a turn around a wheel with
-    a radius (mm), and a straight run.
-
-    Args:
-        drawn, run: lengths of the modelled inner face and of that run, mm.
-        layers: thickness of tape and gel, mm.
-        width: width of the belt, mm.
+    No light reaches the return of the belt, which is not modelled: half a turn around a wheel, and
+    a straight run. Lengths of the modelled inner face and of this run, the radius of the wheel, the
+    thickness of tape and gel and the width of the belt are in mm.
     """
     tape, gel = layers
     inner, outer = radius + tape, radius + tape + gel
