@@ -18,8 +18,9 @@ from optisense.geometry.mesh_files import obj_text, read_mesh
 IntArray = NDArray[np.int32]
 
 CREASE = 40.0
-"""Default angle (degrees) between faces above which an edge stays sharp in shading: edges of
-machined parts are at 45 degrees and more, and facets of curved surfaces at a few degrees."""
+"""Default angle (degrees) between faces above which an edge always stays sharp in shading: most
+edges of machined parts are at 45 degrees and more, and facets of curved surfaces at a few degrees.
+Below it, bends that belong to no curved surface are sharp; see `_isolated_bends`."""
 
 _BOX_SIDES = (  # (axis across the side, the two axes in it, which end of the axis)
     (2, 0, 1, 1), (2, 1, 0, 0), (0, 1, 2, 1), (0, 2, 1, 0), (1, 2, 0, 1), (1, 0, 2, 0),
@@ -278,7 +279,7 @@ class TriangleMesh:
 
     def vertex_normals(self, crease: float = CREASE) -> TriangleMesh:
         """Return the mesh with smooth shading normals, kept apart across edges sharper than
-        `crease` degrees.
+        `crease` degrees and across weaker ones between flat faces of no curved surface.
 
         Vertices are split where their corners disagree; see `shading_normals`.
         """
@@ -291,9 +292,7 @@ class TriangleMesh:
     def _smoothed(self, crease: float) -> TriangleMesh:
         from optisense.geometry.shading_normals import smooth_corners
 
-        vertex, faces, normals = smooth_corners(
-            self.triangles, self.faces, self.face_normals, crease
-        )
+        vertex, faces, normals = smooth_corners(self, crease)
         return TriangleMesh(self.vertices[vertex], faces, normals)
 
 

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.array_types import FloatArray
+from optisense.geometry._isolated_bends import divide_at_isolated_bends
+from optisense.geometry.mesh import TriangleMesh
 
 SAME_NORMAL = 1e-6
 """Difference between the components of unit normals below which corners of a vertex share it: far
@@ -18,23 +20,23 @@ above the rounding of double precision, and an angle of 6e-5 degrees."""
 
 
 def smooth_corners(
-    triangles: FloatArray, faces: NDArray[np.integer], normals: FloatArray, crease: float
+    mesh: TriangleMesh, crease: float
 ) -> tuple[NDArray[np.integer], NDArray[np.int32], FloatArray]:
     """Compute corner normals, and split the vertices whose corners disagree.
 
     Args:
-        triangles, faces, normals: (m, 3, 3) corners, mm, (m, 3) vertices and (m, 3) unit normals of
-            the faces.
+        mesh: the mesh; its own shading normals are not used.
         crease: angle (degrees) above which faces around a vertex are not averaged.
 
     Returns:
         The old number (k,) of each new vertex, faces (m, 3) int32 of the new vertices, and their
         unit normals (k, 3).
     """
+    faces, source = divide_at_isolated_bends(mesh, crease)
     vertex = faces.reshape(-1)
-    count = int(vertex.max()) + 1 if len(vertex) else 0
-    normal = np.repeat(normals, 3, axis=0)
-    weighted = corner_angles(triangles)[:, None] * normal
+    count = len(source)
+    normal = np.repeat(mesh.face_normals, 3, axis=0)
+    weighted = corner_angles(mesh.triangles)[:, None] * normal
     total = np.column_stack([np.bincount(vertex, weighted[:, k], count) for k in range(3)])
     length = np.linalg.norm(total, axis=1, keepdims=True)
     mean: FloatArray = total / np.where(length > 0, length, 1.0)
@@ -50,13 +52,13 @@ def smooth_corners(
     corner = new[vertex]
     others = np.flatnonzero(corner < 0)
     if not len(others):
-        return kept, corner.reshape(-1, 3).astype(np.int32), mean[kept]
+        return source[kept], corner.reshape(-1, 3).astype(np.int32), mean[kept]
     split = _averaged(vertex[others], weighted[others], normal[others], crease)
     key = np.column_stack([vertex[others], np.round(split / SAME_NORMAL).astype(np.int64)])
     _, first, inverse = np.unique(key, axis=0, return_index=True, return_inverse=True)
     corner[others] = len(kept) + inverse.reshape(-1)
     return (
-        np.concatenate([kept, vertex[others][first]]),
+        source[np.concatenate([kept, vertex[others][first]])],
         corner.reshape(-1, 3).astype(np.int32),
         np.concatenate([mean[kept], split[first]]),
     )

@@ -310,9 +310,7 @@ class _Sheet:
 
     @classmethod
     def of(cls, mesh: TriangleMesh) -> _Sheet:
-        source, faces, normals = smooth_corners(
-            mesh.triangles, mesh.faces, mesh.face_normals, CREASE
-        )
+        source, faces, normals = smooth_corners(mesh, CREASE)
         smooth = TriangleMesh(mesh.vertices[source], faces, normals)
         return cls(smooth, source, len(mesh.vertices))
 

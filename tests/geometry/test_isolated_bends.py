@@ -1,0 +1,59 @@
+"""Bends between flat faces, which are sharp, and bends of curved surfaces, which are smooth."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from optisense.geometry import TriangleMesh
+from optisense.sensors._shapes import arc, revolve, ribbon
+
+RISE = np.tan(np.radians(10.0))
+EDGE = np.tan(np.radians(20.0))
+
+
+@pytest.mark.parametrize("cells", [1, 12])
+@pytest.mark.parametrize(
+    "outline",
+    [
+        [(-8, 0), (0, 8 * RISE), (8, 0)],
+        [(-8, 0), (-7, EDGE), (7, EDGE), (8, 0)],
+        [(0, 0), (1, RISE), (2, 0), (3, RISE), (4, 0), (5, RISE)],
+    ],
+    ids=["roof", "plate with two bevels", "rows of prisms"],
+)
+def test_flat_faces_remain_flat(outline: list[tuple[float, float]], cells: int) -> None:
+    smooth = ribbon(outline, 3.0, cells).vertex_normals()
+    assert smooth.normals is not None
+    corners = smooth.normals[smooth.faces]
+    np.testing.assert_allclose(corners, np.repeat(smooth.face_normals[:, None], 3, 1), atol=1e-9)
+    assert len(smooth.vertices) == (len(outline) - 1) * 2 * (cells + 1)
+
+
+def test_a_shallow_recess_has_a_sharp_rim() -> None:
+    recess = revolve([[0, 0], [0, 3], [2, 3], [4, 4], [9, 4], [9, 0]], 60).vertex_normals()
+    assert recess.normals is not None
+    flat = np.abs(recess.face_normals[:, 2]) > 0.999
+    np.testing.assert_allclose(np.abs(recess.normals[recess.faces[flat], 2]), 1.0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "outline",
+    [
+        arc((0.0, 0.0), 5.0, 0.0, 90.0, 3),
+        [*arc((0.0, 0.0), 5.0, 0.0, 60.0, 6), *arc((5.0, 8.66), 5.0, 240.0, 180.0, 6)[1:]],
+        [(-9, 0.0), *((x, np.sqrt(100 - x**2) - 10) for x in np.linspace(0, 3, 4)), (3.1, -0.51)],
+    ],
+    ids=["arc of three facets", "S", "fillet that ends in a narrow facet"],
+)
+def test_curves_remain_smooth(outline: list[tuple[float, float]]) -> None:
+    sheet = ribbon(outline, 3.0, 1)
+    assert len(sheet.vertex_normals().vertices) == len(sheet.vertices)
+
+
+def test_irregular_triangles_remain_smooth() -> None:
+    from scipy.spatial import Delaunay
+
+    points = np.random.default_rng(1).uniform(-5, 5, (80, 2))
+    lens = TriangleMesh(np.c_[points, (points**2).sum(axis=1) / 25], Delaunay(points).simplices)
+    assert len(lens.vertex_normals().vertices) == len(points)
