@@ -126,6 +126,7 @@ def _from_cad(source: Path, folder: Path, units: str | None, yes: bool, is_new: 
         save_made,
         save_recipe,
     )
+    from optisense.sensors.from_meshes.files import unread_files
 
     if not source.exists():
         raise DesignError(
@@ -138,6 +139,7 @@ def _from_cad(source: Path, folder: Path, units: str | None, yes: bool, is_new: 
         recipe = read_recipe(source)
     elif yes:
         recipe, guessed = guess_recipe(source, _units(units)), True
+        print_notes(unread_files(source))
     elif _at_terminal():
         from optisense.cli.new_questions import ask_recipe
 

@@ -22,7 +22,7 @@ from optisense.cli.asking import (
     ask_yes,
     three_numbers,
 )
-from optisense.cli.console import messages
+from optisense.cli.console import messages, print_notes
 from optisense.design import Role
 from optisense.design.colour import NAMED_COLOURS
 from optisense.design.materials import kinds_for
@@ -33,7 +33,13 @@ from optisense.length_units import MM_PER, Units
 from optisense.sensors.from_meshes import guessing
 from optisense.sensors.from_meshes.building import USUAL_MATERIAL
 from optisense.sensors.from_meshes.directions import SIDES
-from optisense.sensors.from_meshes.files import CadBody, Use, largest_dimension, likely_units
+from optisense.sensors.from_meshes.files import (
+    CadBody,
+    Use,
+    largest_dimension,
+    likely_units,
+    unread_files,
+)
 from optisense.sensors.from_meshes.fingertips import is_round
 from optisense.sensors.from_meshes.recipe import CameraChoice, Recipe
 from optisense.sensors.from_meshes.recipe_lights import LightChoice
@@ -71,6 +77,7 @@ def ask_recipe(source: Path, units: Units | None) -> Recipe:
     found = guessing.find_bodies(source)
     folder = source if source.is_dir() else source.parent
     say(f"{len(found)} bodies in {source}. Enter accepts the answer in brackets.")
+    print_notes(unread_files(source))
     name = ask("Name of the sensor", _not_empty, guessing.usual_name(source))
     units = units or _ask_units(found)
     meshes = {each.name: each.mesh(units) for each in found}

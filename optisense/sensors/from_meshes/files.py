@@ -26,6 +26,11 @@ from optisense.untrusted_files import is_file, is_folder
 
 ALL_FORMATS = (*FORMATS, *STEP_FORMATS)
 
+OTHER_FORMATS = (
+    ".3mf", ".amf", ".f3d", ".glb", ".gltf", ".iges", ".igs", ".ipt", ".sldprt", ".x_b", ".x_t",
+)  # fmt: skip
+"""Formats of shapes that are not read."""
+
 SMALLEST, LARGEST = 4.0, 400.0
 """Range of the largest dimension of a tactile sensor, mm; other sizes come from a wrong unit."""
 
@@ -156,6 +161,16 @@ def _mesh(path: Path) -> TriangleMesh:
             hint="In the CAD tool: show the body, select it, and export a solid or a surface as "
             "a mesh; sketches, points and hidden bodies have no faces",
         ) from None
+
+
+def unread_files(folder: Path) -> list[str]:
+    """Return a sentence that names the files of shapes in a folder which are not read; [] if there
+    are none, or if `folder` is a file.
+    """
+    files = sorted(folder.iterdir()) if is_folder(folder) else []
+    names = [file.name for file in files if file.suffix.lower() in OTHER_FORMATS]
+    told = f"not read: {brief(', '.join(names))} (export as STL, OBJ, PLY or STEP)"
+    return [told] if names else []
 
 
 def obj_objects(path: Path) -> list[str]:

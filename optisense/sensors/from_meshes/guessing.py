@@ -31,6 +31,7 @@ from optisense.sensors.from_meshes.files import (
     largest_dimension,
     likely_units,
     obj_objects,
+    unread_files,
     with_copies,
 )
 from optisense.sensors.from_meshes.fingertips import LED_PITCH, is_round, lights_and_camera
@@ -112,7 +113,7 @@ def _each_body(source: Path, chosen: Sequence[str]) -> list[CadBody]:
         files = [folder / name for name in chosen]
     if not files:
         raise MeshError(
-            "there are no CAD files here",
+            "; ".join(["there are no CAD files here", *unread_files(source)]),
             where=str(source),
             hint="In the CAD tool: export each part as STL, OBJ or PLY, or all as one STEP file",
         )
@@ -235,9 +236,10 @@ def recipe_of(
     skin = next((n for n, part in parts.items() if part.role is Role.SENSING_SURFACE), None)
     carrier = carrier_of({name: part.role for name, part in parts.items()})
     if carrier is None:
+        told = ", ".join(f"{each.name}: {each.use}" for each in found)
+        problem = f"no body is recognised as the gel or the sensing surface: {told}"
         raise MeshError(
-            "no body is recognised as the gel or the sensing surface: "
-            + ", ".join(f"{each.name}: {each.use}" for each in found),
+            "; ".join([problem, *unread_files(source)]),
             where=str(source),
             hint=_naming_hint(found, folder),
         )

@@ -12,6 +12,7 @@ from step_extra import needs_step, write_step
 
 from optisense.errors import DesignError, LibraryError, MeshError, OptiSenseError
 from optisense.sensors.from_meshes import design_from_meshes, guess_recipe
+from optisense.sensors.from_meshes.files import unread_files
 
 
 def error_of(recipe: Any) -> OptiSenseError:
@@ -126,6 +127,20 @@ class TestFiles:
         cad.folder.mkdir()
         with pytest.raises(MeshError, match="no CAD files"):
             guess_recipe(cad.folder)
+
+    def test_files_of_other_formats_are_told(self, cad: Any) -> None:
+        cad.folder.mkdir()
+        for name in ("gel.3mf", "notes.txt", "window.IGS"):
+            (cad.folder / name).touch()
+        told = "not read: gel.3mf, window.IGS (export as STL, OBJ, PLY or STEP)"
+        assert unread_files(cad.folder) == [told]
+        with pytest.raises(MeshError) as caught:
+            guess_recipe(cad.folder)
+        assert caught.value.message == f"there are no CAD files here; {told}"
+        cad.shapes()["plate"].export(cad.folder / "thing.stl")
+        with pytest.raises(MeshError) as caught:
+            guess_recipe(cad.folder)
+        assert caught.value.message.endswith(f"thing: blocker; {told}")
 
     def test_names_that_say_nothing(self, cad: Any) -> None:
         cad.folder.mkdir()
