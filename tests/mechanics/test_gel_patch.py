@@ -15,8 +15,8 @@ from optisense.mechanics import Elasticity
 from optisense.mechanics import _gel_patches as gel_patches
 from optisense.mechanics import _point_load as point_load
 from optisense.mechanics._gel_columns import gel_columns
+from optisense.mechanics._gel_elements import CORNERS, stiffnesses
 from optisense.mechanics._gel_patch import GelPatch
-from optisense.mechanics._hexahedra import CORNERS, stiffnesses
 from optisense.optics._ray_model import RayModel
 from optisense.sensors import load
 from optisense.sensors._shapes import revolve
