@@ -172,7 +172,9 @@ def digit(size: DigitDimensions) -> SensorDesign:
     design.meshes.update(
         skin=_coated(gel),
         gel=gel,
-        acrylic=_prism(edge, window_bottom, window_top, size.tessellation),
+        acrylic=stacked(
+            [_ring(edge.points(size.tessellation), z) for z in (window_bottom, window_top)]
+        ),
         housing=_housing(
             outline,
             edge,
@@ -256,11 +258,6 @@ def _led(
 
 def _ring(points: FloatArray, z: float | FloatArray) -> FloatArray:
     return np.column_stack([points, np.broadcast_to(z, len(points))])
-
-
-def _prism(outline: HalfRound, bottom: float, top: float, tessellation: float) -> TriangleMesh:
-    points = outline.points(tessellation)
-    return stacked([_ring(points, bottom), _ring(points, top)])
 
 
 def _gel(

@@ -113,11 +113,8 @@ def light_problems(design: SensorDesign) -> list[Diagnostic]:
 def windows_in(
     design: SensorDesign, parts: dict[str, TriangleMesh], exempt: set[tuple[str, int, str]]
 ) -> Iterator[WindowIn]:
-    """Yield the lights of which a sample of the window lies in a part, by group and part.
-
-    Args:
-        parts: closed meshes, mm, by part.
-        exempt: group, number and part of lights that are left out.
+    """Yield the lights of which a sample of the window lies in a closed part, by group and part,
+    but for some that are exempt by group, number and part.
     """
     samples = {
         (name, index): window
@@ -157,10 +154,7 @@ def _overlapping(design: SensorDesign, crowded: set[str]) -> list[Diagnostic]:
     """Return warnings about windows in nearly one plane that overlap, one for each two groups.
 
     Rays that end there meet only one of the windows. Lights with the same window, such as the dies
-    of an RGB LED, count as one.
-
-    Args:
-        crowded: groups whose own lights are not compared, as there is a warning about them.
+    of an RGB LED, count as one, and those of one crowded group are not compared.
     """
     windows = [
         (name, window) for name, group in design.lights.items() for window in _samples(group)

@@ -97,11 +97,8 @@ class CadFiles:
         return self._read[path]
 
     def load(self, shape: ShapeReference, units: str, where: str) -> TriangleMesh:
-        """Return the mesh of a shape that comes from a file, mm.
-
-        Args:
-            units: unit of the files that don't state theirs and for which the shape gives none.
-            where: name for messages, such as 'part gel (gel.stl)'.
+        """Return the mesh of a shape that comes from a file, mm; `units` are those of files that
+        state none, and `where` is a name for messages, such as 'part gel (gel.stl)'.
 
         Raises:
             OptiSenseError: see `bodies`; or a STEP file lacks one of the bodies, or it has several
@@ -224,16 +221,12 @@ def likely_units(size: float) -> list[str]:
 def refuse_odd_units(
     meshes: dict[str, TriangleMesh], units: str | None, gels: Collection[str] = ()
 ) -> list[str]:
-    """Check whether the sizes of parts are plausible.
+    """Return what is unusual about the sizes (mm) of parts, one sentence each.
 
     Args:
-        meshes: meshes in mm by their origin, such as 'part gel (gel.stl)'; only of files that don't
-            state their units.
+        meshes: meshes by their origin, such as 'part gel (gel.stl)', of files without units.
         units: units that were given; None if mm was assumed.
         gels: names in `meshes` of the elastomers, which are nearly as large as the sensor.
-
-    Returns:
-        Unusual findings, one sentence each.
 
     Raises:
         MeshError: the whole is too small or too large for a tactile sensor, or one part is far
@@ -263,11 +256,7 @@ def refuse_odd_units(
 
 def _odd_parts(meshes: dict[str, TriangleMesh], scale: float, gels: Collection[str]) -> list[str]:
     """Return notes on parts that are much smaller or larger than the others, and refuse obvious
-    errors.
-
-    Args:
-        scale: length of the files' unit, mm.
-        gels: see `refuse_odd_units`.
+    errors; `scale` is the length of the files' unit, mm.
     """
     notes = []
     sizes = {where: float(np.ptp(mesh.bounds, axis=0).max()) for where, mesh in meshes.items()}

@@ -52,10 +52,6 @@ def is_round(gel: TriangleMesh, outward: str) -> bool:
     The faces that continue the outermost ones without a sharp edge are those of a dome if more of
     them are inclined by `WITHIN` to `STEEP` degrees than by less. The rounded edges of a pad are
     smaller than its top, and its sides are steeper.
-
-    Args:
-        gel: mesh of the part that carries the coating, mm.
-        outward: side on which the sensor is touched, such as +z.
     """
     mesh = gel.welded()
     top = faces_towards(mesh, vector(outward), WITHIN)
@@ -70,15 +66,9 @@ def is_round(gel: TriangleMesh, outward: str) -> bool:
 def lights_and_camera(
     meshes: Mapping[str, TriangleMesh], clear: list[str], outward: str, light: str, flux: float
 ) -> tuple[dict[str, LightChoice], CameraChoice] | None:
-    """Return a ring of red, green and blue lights at the open side of a hollow dome, and a fisheye
-    within it that looks into the dome; None if there is no cavity with room for them.
-
-    Args:
-        meshes: meshes of all parts by name, mm.
-        clear: names of the transparent parts, the gel first.
-        outward: direction of the dome's tip, such as +z.
-        light: light of the library.
-        flux: flux of each light, mW.
+    """Return a ring of red, green and blue lights at the open side of a hollow dome, whose tip
+    points outward, and a fisheye within it that looks into the dome; None if there is no cavity
+    with room for them. The gel is the first of the transparent parts, and the flux is in mW.
     """
     axis, sign = axis_of(outward)
     way = vector(outward)

@@ -90,12 +90,8 @@ LIGHT, CAMERA = "smd-3528", "pi-v2"
 
 
 def find_bodies(source: Path, chosen: Sequence[str] = ()) -> list[CadBody]:
-    """Return all bodies of a CAD file, or of the CAD files in a folder; copies of one light on one
-    side of the gel are one body.
-
-    Args:
-        source: file or folder.
-        chosen: names of files in the folder; all CAD files there if none is given.
+    """Return all bodies of a CAD file, or of some or all CAD files in a folder; copies of one light
+    on one side of the gel are one body.
 
     Raises:
         SetupError: a file is a STEP file, but the extra for it is missing.
@@ -178,12 +174,8 @@ def guess_units(found: Iterable[CadBody]) -> Units | None:
 
 
 def guess_outward(meshes: dict[str, TriangleMesh], carrier: str) -> str:
-    """Return the side on which the sensor is touched, such as +z: away from the parts behind the
-    gel.
-
-    Args:
-        meshes: meshes of all bodies, by name, mm.
-        carrier: name of the one that carries the coating.
+    """Return the side on which the sensor is touched, such as +z: that of the body that carries the
+    coating which is away from the other bodies.
     """
     own = meshes[carrier]
     others = [mesh.bounds.mean(axis=0) for name, mesh in meshes.items() if name != carrier]
@@ -216,13 +208,10 @@ def recipe_of(
     units: Units | None = None,
     uses: Mapping[str, Use] | None = None,
 ) -> Recipe:
-    """Return a recipe for bodies that were read, with default lights and a default camera.
+    """Return a recipe for bodies from `find_bodies` with default lights and a default camera; see
+    `guess_recipe`.
 
-    Args:
-        bodies: bodies from `find_bodies`.
-        source: file or folder in which they were found.
-        units: unit of the files that don't state theirs; None means mm, or the only plausible unit.
-        uses: uses of bodies by their names, where they are known better than by guessing.
+    Uses are those of bodies by their names, where they are known better than by guessing.
 
     Raises:
         MeshError: no body can carry the coating.
@@ -334,15 +323,9 @@ def usual_lights_and_camera(
 ) -> tuple[dict[str, LightChoice], CameraChoice]:
     """Return lights and a camera for a sensor whose files contain none.
 
-    A hollow dome gets a ring of lights and a fisheye inside; other sensors get rows of lights along
-    three sides of the first support, or else of the gel, and a camera behind the sensing surface.
-
-    Args:
-        parts: parts of the sensor by name.
-        meshes: meshes of at least these parts, mm.
-        carrier: name of the part that carries the coating.
-        outward: side on which the sensor is touched.
-        dome: whether the carrier is round (`is_round`).
+    A hollow dome, whose part that carries the coating is round, gets a ring of lights and a fisheye
+    inside; other sensors get rows of lights along three sides of the first support, or else of the
+    gel, and a camera behind the sensing surface.
     """
     supports = [name for name, part in parts.items() if part.role is Role.SUPPORT]
     if dome:

@@ -21,12 +21,8 @@ WITHIN = 30.0
 
 
 def pick(mesh: TriangleMesh, shape: ShapeReference, where: str) -> list[Faces]:
-    """Return the faces that a shape selects, as patches, the largest first.
-
-    Args:
-        mesh: all faces, welded, mm.
-        shape: shape with the selection; without `towards`, all faces are selected.
-        where: name for messages.
+    """Return the faces of a welded mesh that a shape selects, all without `towards`, as patches,
+    the largest first.
 
     Raises:
         DesignError: no face points in that direction.
