@@ -19,7 +19,7 @@ pixels wide has a standard deviation of half a pixel, little more than that of a
 (0.29)."""
 
 
-def focus_problems(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
+def focus_problem(design: SensorDesign, meshes: Meshes) -> Diagnostic | None:
     """Return a warning if the sensing surface is out of focus.
 
     Cameras whose blur does not depend on depth are not checked.
@@ -29,28 +29,25 @@ def focus_problems(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
     """
     camera = design.camera
     if camera.blur is None or not camera.blur.by_depth or design.parts_of(Role.MIRROR):
-        return []
+        return None
     distance = apparent_distances(design, meshes)
     if not distance.size:
-        return []
+        return None
     deviation = camera.blur.deviation(camera, 1.0 / distance)
     circle = deviation / DISC_DEVIATION * camera.resolution[0]
     soft = circle > SHARP
     if not soft.any():
-        return []
+        return None
     near, far = distance.min(), distance.max()
     place = f"{near:.3g} mm" if far - near < 0.05 * near else f"{near:.3g} to {far:.3g} mm"
     middle = 0.5 * (1.0 / near + 1.0 / far)
-    return [
-        Diagnostic(
-            f"{100 * soft.mean():.0f} % of the sensing surface in view is out of focus: circles of "
-            f"confusion of up to {circle.max():.1f} pixels; it appears {place} away",
-            design.where("camera", "blur"),
-            f"Focus {1.0 / middle:.3g} mm away (camera.blur.focus_distance), or give a larger "
-            "f-number",
-            severity="warning",
-        )
-    ]
+    return Diagnostic(
+        f"{100 * soft.mean():.0f} % of the sensing surface in view is out of focus: circles of "
+        f"confusion of up to {circle.max():.1f} pixels; it appears {place} away",
+        design.where("camera", "blur"),
+        f"Focus {1.0 / middle:.3g} mm away (camera.blur.focus_distance), or give a larger f-number",
+        severity="warning",
+    )
 
 
 def apparent_distances(design: SensorDesign, meshes: Meshes) -> FloatArray:

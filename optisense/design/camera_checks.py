@@ -69,48 +69,42 @@ BEFORE = 1e-6
 ends at the skin does not. It covers rounding."""
 
 
-def lens_problems(camera: Camera, where: str) -> list[Diagnostic]:
+def lens_problem(camera: Camera, where: str) -> Diagnostic | None:
     """Return the problem of a field of view, at a place of the design, that no lens has; that of
     fisheyes is the true one.
     """
     if camera.fov < NARROWEST:
-        return [
-            Diagnostic(
-                f"no lens of a sensor sees as little as {camera.fov:g} degrees",
-                where,
-                f"Give {NARROWEST:g} degrees or more",
-            )
-        ]
+        return Diagnostic(
+            f"no lens of a sensor sees as little as {camera.fov:g} degrees",
+            where,
+            f"Give {NARROWEST:g} degrees or more",
+        )
     if camera.projection == "equidistant":
         folds = folding_angle(camera)
         across = angle_across(camera) if folds is None else camera.fov
         if across <= WIDEST_FISHEYE + ROUNDED:
-            return []
-        return [
-            Diagnostic(
-                f"no fisheye lens sees {across:.4g} degrees",
-                where,
-                f"Give {WIDEST_FISHEYE:g} degrees or less; its distortion counts",
-            )
-        ]
+            return None
+        return Diagnostic(
+            f"no fisheye lens sees {across:.4g} degrees",
+            where,
+            f"Give {WIDEST_FISHEYE:g} degrees or less; its distortion counts",
+        )
     width, height = camera.resolution
     diagonal = float(np.hypot(1.0, height / width))
     corner = np.degrees(2.0 * np.arctan(diagonal * np.tan(np.radians(camera.fov / 2.0))))
     if corner <= WIDEST_PERSPECTIVE:
-        return []
+        return None
     half = np.tan(np.radians(WIDEST_PERSPECTIVE / 2.0)) / diagonal
     most = np.floor(10.0 * np.degrees(2.0 * np.arctan(half))) / 10.0
-    return [
-        Diagnostic(
-            f"no perspective lens sees {camera.fov:g} degrees across the image "
-            f"({corner:.0f} from corner to corner)",
-            where,
-            f"Give {most:g} degrees or less, or use 'projection: equidistant'",
-        )
-    ]
+    return Diagnostic(
+        f"no perspective lens sees {camera.fov:g} degrees across the image "
+        f"({corner:.0f} from corner to corner)",
+        where,
+        f"Give {most:g} degrees or less, or use 'projection: equidistant'",
+    )
 
 
-def place_problems(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
+def place_problem(design: SensorDesign, meshes: Meshes) -> Diagnostic | None:
     """Return the problem of a camera whose lens is inside a transparent solid or another part.
 
     Cameras inside opaque solids are found together with the lights. A camera that is cast into a
@@ -123,34 +117,28 @@ def place_problems(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
     for name, mesh in meshes.items():
         role = design.parts[name].role
         if role in TRANSPARENT_SOLIDS and mesh.is_closed and inside(position[None], mesh)[0]:
-            return [
-                Diagnostic(
-                    f"the camera is inside the solid part '{name}' ({role.value}) at {at}",
-                    where,
-                    "Move it out, or make a cavity for it in the part's mesh, such as a sphere "
-                    "about the camera's position",
-                )
-            ]
+            return Diagnostic(
+                f"the camera is inside the solid part '{name}' ({role.value}) at {at}",
+                where,
+                "Move it out, or make a cavity for it in the part's mesh, such as a sphere "
+                "about the camera's position",
+            )
     for name, mesh in meshes.items():
         distance = distance_within(mesh, position, SMALLEST_CAMERA)
         if distance < 0.5 * SMALLEST_CAMERA:
-            return [
-                Diagnostic(
-                    f"the camera is {distance:.2g} mm from part '{name}' at {at}: even the "
-                    f"smallest camera is {SMALLEST_CAMERA:g} mm wide, so its lens is in the part",
-                    where,
-                    f"Move it {0.5 * SMALLEST_CAMERA:.2g} mm or more away",
-                )
-            ]
-    return []
+            return Diagnostic(
+                f"the camera is {distance:.2g} mm from part '{name}' at {at}: even the "
+                f"smallest camera is {SMALLEST_CAMERA:g} mm wide, so its lens is in the part",
+                where,
+                f"Move it {0.5 * SMALLEST_CAMERA:.2g} mm or more away",
+            )
+    return None
 
 
 def camera_fault(design: SensorDesign, meshes: Meshes) -> Diagnostic | None:
     """Return the first reason why the camera can't exist, or None."""
-    found = lens_problems(design.camera, design.where("camera", "fov"))
-    found = found or uniqueness_problems(design)
-    found = found or place_problems(design, meshes)
-    return found[0] if found else None
+    lens = lens_problem(design.camera, design.where("camera", "fov"))
+    return lens or uniqueness_problem(design) or place_problem(design, meshes)
 
 
 class ViewShares(NamedTuple):
@@ -172,7 +160,7 @@ class ViewShares(NamedTuple):
     hidden: dict[str, float]
 
 
-def view_problems(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
+def view_problem(design: SensorDesign, meshes: Meshes) -> Diagnostic | None:
     """Return a warning if too little of the sensing surface is in the camera's straight view.
 
     Refraction is ignored, so this is only a warning; scores use refracted rays. Designs with
@@ -180,50 +168,44 @@ def view_problems(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
     """
     shares = view_shares(design, meshes)
     if shares is None:
-        return []
+        return None
     where = design.where("camera", "direction")
     if shares.picture >= LEAST_PICTURE and shares.skin >= LEAST_SKIN:
-        return []
+        return None
     hider = max(shares.hidden, key=lambda name: shares.hidden[name], default=None)
     if hider is not None and shares.hidden[hider] > shares.skin:
-        return [
-            Diagnostic(
-                f"part '{hider}' (blocker) hides {100 * shares.hidden[hider]:.0f} % of the sensing "
-                f"surface from the camera, which sees {100 * shares.skin:.0f} %, if refraction is "
-                "neglected",
-                design.where("parts", hider, "role"),
-                "If it is clear, its role is support; otherwise move it or the camera",
-                severity="warning",
-            )
-        ]
+        return Diagnostic(
+            f"part '{hider}' (blocker) hides {100 * shares.hidden[hider]:.0f} % of the sensing "
+            f"surface from the camera, which sees {100 * shares.skin:.0f} %, if refraction is "
+            "neglected",
+            design.where("parts", hider, "role"),
+            "If it is clear, its role is support; otherwise move it or the camera",
+            severity="warning",
+        )
     if shares.outside > shares.skin:
-        return [
-            Diagnostic(
-                f"the camera looks at the outside of the coating on {100 * shares.outside:.0f} % "
-                f"of the sensing surface, and sees the inside of {100 * shares.skin:.0f} %, if "
-                "refraction is neglected",
-                design.where("camera", "position"),
-                "Move the camera to the side of the gel; or, if it is there, turn the faces of the "
-                "sensing surface over, as their normals must point to that side",
-                severity="warning",
-            )
-        ]
+        return Diagnostic(
+            f"the camera looks at the outside of the coating on {100 * shares.outside:.0f} % "
+            f"of the sensing surface, and sees the inside of {100 * shares.skin:.0f} %, if "
+            "refraction is neglected",
+            design.where("camera", "position"),
+            "Move the camera to the side of the gel; or, if it is there, turn the faces of the "
+            "sensing surface over, as their normals must point to that side",
+            severity="warning",
+        )
     skins = [meshes[name] for name in design.parts_of(Role.SENSING_SURFACE) if name in meshes]
     in_sight = any(in_picture(design.camera, skin.vertices).any() for skin in skins)
     if shares.picture == 0.0 and shares.skin == 0.0 and not in_sight:
-        return [
-            Diagnostic(
-                "the sensing surface is not in the camera's field of view",
-                where,
-                "Point the camera's direction at it, or move the camera, unless the parts bend the "
-                "light that far",
-                severity="warning",
-            )
-        ]
+        return Diagnostic(
+            "the sensing surface is not in the camera's field of view",
+            where,
+            "Point the camera's direction at it, or move the camera, unless the parts bend the "
+            "light that far",
+            severity="warning",
+        )
     if shares.picture < LEAST_PICTURE:
         filled = 100 * shares.picture
-        return [_small(f"the sensing surface fills {filled:.0f} % of the picture", where)]
-    return [_small(f"{100 * shares.skin:.0f} % of the sensing surface is in the picture", where)]
+        return _small(f"the sensing surface fills {filled:.0f} % of the picture", where)
+    return _small(f"{100 * shares.skin:.0f} % of the sensing surface is in the picture", where)
 
 
 def view_shares(design: SensorDesign, meshes: Meshes) -> ViewShares | None:
@@ -281,17 +263,15 @@ def _small(message: str, where: str) -> Diagnostic:
     )
 
 
-def uniqueness_problems(design: SensorDesign) -> list[Diagnostic]:
+def uniqueness_problem(design: SensorDesign) -> Diagnostic | None:
     """Return the problem of a lens that shows a direction twice within the picture."""
     angle = folding_angle(design.camera)
     if angle is None:
-        return []
-    return [
-        Diagnostic(
-            f"the lens's distortion folds {angle:.3g} degrees off its axis, inside the picture: "
-            "points beyond are shown twice, or some pixels show nothing",
-            design.where("camera", "distortion"),
-            "Give coefficients nearer to 0, or a smaller field of view (fov); a calibration is "
-            "valid only where its marks were",
-        )
-    ]
+        return None
+    return Diagnostic(
+        f"the lens's distortion folds {angle:.3g} degrees off its axis, inside the picture: "
+        "points beyond are shown twice, or some pixels show nothing",
+        design.where("camera", "distortion"),
+        "Give coefficients nearer to 0, or a smaller field of view (fov); a calibration is "
+        "valid only where its marks were",
+    )

@@ -7,15 +7,15 @@ from collections.abc import Collection, Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.design._focus_checks import focus_problems
+from optisense.design._focus_checks import focus_problem
 from optisense.design.addressing import get_value
 from optisense.design.arrangement import films, overlaps
 from optisense.design.cage_checks import cage_problems, half_caged, left_lights
 from optisense.design.camera_checks import (
-    lens_problems,
-    place_problems,
-    uniqueness_problems,
-    view_problems,
+    lens_problem,
+    place_problem,
+    uniqueness_problem,
+    view_problem,
 )
 from optisense.design.limits import placed_things, unit_slips
 from optisense.design.material_checks import absorption_problems, index_problems
@@ -68,11 +68,11 @@ def check_design(
     for name in design.parts:
         problems += _check_mesh(design, name, meshes)
     problems += unit_slips(design, meshes)
-    problems += lens_problems(design.camera, design.where("camera", "fov"))
     of_kinds = kind_problems(design)
-    if not of_kinds:  # these call methods of kinds
-        problems += uniqueness_problems(design)
-        problems += index_problems(design)
+    lens = lens_problem(design.camera, design.where("camera", "fov"))
+    folded = None if of_kinds else uniqueness_problem(design)  # this calls methods of kinds
+    problems += [problem for problem in (lens, folded) if problem is not None]
+    problems += [] if of_kinds else index_problems(design)
     problems += _check_finishes(design, meshes)
     problems += _check_lights(design, light_names)
     problems += of_kinds
@@ -85,9 +85,9 @@ def check_design(
         else:
             problems += _check_poses(design, meshes)
             problems += _check_sensing_surfaces(design, meshes)
-            problems += place_problems(design, meshes)
-            problems += view_problems(design, meshes)
-            problems += focus_problems(design, meshes)
+            checks = (place_problem, view_problem, focus_problem)
+            found = (check(design, meshes) for check in checks)
+            problems += [problem for problem in found if problem is not None]
             problems += absorption_problems(design, meshes)
             bent = cage_problems(design, meshes)
             problems += bent

@@ -10,7 +10,7 @@ from typing import TypeGuard
 import numpy as np
 
 from optisense.design import SensorDesign
-from optisense.design.camera_checks import uniqueness_problems
+from optisense.design.camera_checks import uniqueness_problem
 from optisense.design.problems import raise_problems
 from optisense.errors import RenderError
 from optisense.geometry import Contact, Indenter, SensingSurface, Sphere, TriangleMesh, nine_places
@@ -79,7 +79,8 @@ def ray_camera(design: SensorDesign, resolution: tuple[int, int] | None = None) 
         raise RenderError(
             f"a picture of {width}x{height} pixels has no pixel", hint="Give e.g. 320x240"
         )
-    raise_problems(uniqueness_problems(design), "camera")
+    folded = uniqueness_problem(design)
+    raise_problems([] if folded is None else [folded], "camera")
     return RayCamera(
         position=camera.position,
         direction=camera.direction,

@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from optisense.design import Camera
-from optisense.design.camera_checks import lens_problems
+from optisense.design.camera_checks import lens_problem
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.mesh import grid_faces
@@ -150,9 +150,9 @@ class TestCamera:
         np.testing.assert_allclose(camera.direction, np.array([-3, -4, 12]) / 13, atol=1e-8)
 
     def test_a_wide_view_needs_a_fisheye(self) -> None:
-        (problem,) = lens_problems(self.camera(fov=170.0), "fov")
+        problem = lens_problem(self.camera(fov=170.0), "fov")
         assert "projection: equidistant" in str(problem.hint)
-        assert not lens_problems(self.camera(fov=170.0, projection="equidistant"), "fov")
+        assert not lens_problem(self.camera(fov=170.0, projection="equidistant"), "fov")
 
     @pytest.mark.parametrize(
         ("choice", "message"),
