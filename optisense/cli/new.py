@@ -217,7 +217,7 @@ def _refuse_changed(folder: Path) -> None:
     Raises:
         OutputError: it was changed, or it can't be known whether it was.
     """
-    from optisense.design.difference import listed
+    from optisense.design.problems import listed
     from optisense.sensors import load
     from optisense.sensors.from_meshes import MADE_FILE, changes_since_made
 

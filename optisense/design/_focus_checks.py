@@ -51,13 +51,11 @@ def focus_problem(design: SensorDesign, meshes: Meshes) -> Diagnostic | None:
 
 
 def apparent_distances(design: SensorDesign, meshes: Meshes) -> FloatArray:
-    """Return the apparent distances of the sensing surface along straight rays.
+    """Return the apparent distances (k,), mm, of the sensing surface along the straight rays that
+    meet it before any blocker.
 
-    Distances are measured along the axis for perspective lenses, whose field of focus is flat, and
-    along the ray for others.
-
-    Returns:
-        Distances (k,), mm, of the rays that meet the surface before any blocker.
+    They are measured along the axis for perspective lenses, whose field of focus is flat, and along
+    the ray for others.
     """
     camera, origin = design.camera, np.array(design.camera.position)
     rays = straight_rays(camera)
@@ -79,12 +77,8 @@ def _reduced(
     rays: FloatArray,
     length: FloatArray,
 ) -> FloatArray:
-    """Return the apparent lengths (k,) of rays, mm: each piece is divided by its medium's index.
-
-    Args:
-        origin: start (3,) of all rays, mm.
-        rays: unit directions (k, 3).
-        length: geometric lengths (k,), mm.
+    """Return the apparent lengths (k,), mm, of rays from a point (3,) along unit directions (k, 3),
+    of geometric lengths (k,), mm: each piece is divided by its medium's index.
     """
     solids = [
         (design.parts[name].priority, getattr(design.materials[material], "ior", 1.0), meshes[name])

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design.camera import Camera
-from optisense.design.material_checks import is_gas
+from optisense.design.limits import is_gas
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Diagnostic
 from optisense.design.projection import directions, picture_places, within_view

@@ -15,11 +15,10 @@ from optisense.design.cage import MAX_POINTS, MOST_ALONG, Cage, Share, as_array
 from optisense.design.limits import LARGEST
 from optisense.design.sensor_design import SensorDesign
 from optisense.errors import DesignError
-from optisense.geometry.cage import refined_points
+from optisense.geometry.cage import Resolution, refined_points
 from optisense.keyword_types import is_real
 from optisense.near import suggestion
 
-Resolution = tuple[int, int, int]
 Shape = Literal["points", "c_min", "c_max"]
 """Kind of a cage's control points: those of the present shape, or of an end of its range."""
 

@@ -17,8 +17,7 @@ from optisense.design.camera_checks import (
     uniqueness_problem,
     view_problem,
 )
-from optisense.design.limits import placed_things, unit_slips
-from optisense.design.material_checks import absorption_problems, index_problems
+from optisense.design.limits import absorption_problems, index_problems, placed_things, unit_slips
 from optisense.design.part_faces import finished_faces
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Diagnostic, invalid_values, kind_problems

@@ -22,10 +22,6 @@ LONGEST_LIST = 60
 SAME_PLACE = 1e-5
 """Distance up to which vertices count as equal, mm; mesh files hold a limited number of digits."""
 
-MOST_SHOWN = 8
-"""Largest number of differences that an error lists; the others are counted, so that the message
-fits on a screen."""
-
 
 def design_values(design: SensorDesign) -> dict[str, Any]:
     """Return all values that affect the simulation; names of files and provenance are left out."""
@@ -93,13 +89,6 @@ def plain_differences(old: Any, new: Any) -> list[str]:
     before, now = (json.loads(json.dumps(each)) for each in (old, new))
     _compare(before, now, (), found)
     return found
-
-
-def listed(changed: list[str]) -> str:
-    """Return the first of some differences, one per line."""
-    shown = "\n".join(f"  {line}" for line in changed[:MOST_SHOWN])
-    more = len(changed) - MOST_SHOWN
-    return shown + (f"\n  and {more} more" if more > 0 else "")
 
 
 def _compare(old: Any, new: Any, path: Steps, found: list[str]) -> None:

@@ -13,16 +13,13 @@ from pathlib import Path
 import numpy as np
 
 from optisense.array_types import FloatArray
+from optisense.design.fields import LARGEST_NUMBER
 from optisense.errors import LibraryError
 from optisense.untrusted_files import MOST_DATA, read_bytes
 
 MAX_VALUES = 1_200_000
 """Largest number of candela values of one IES file. A table of one value per quarter degree over
 the sphere has a million."""
-
-MAX_NUMBER = 1e12
-"""Largest magnitude of a number of an IES file, so that no product of them overflows. A searchlight
-has some 1e9 cd."""
 
 
 @dataclass(frozen=True)
@@ -164,12 +161,12 @@ class _Values:
             word = words[int(wrong[0])]
             kind = "a number" if _number(word) is None else "a finite number"
             self.fail(f"'{word[:30]}' is not {kind} (reading {name})")
-        large = np.flatnonzero(np.abs(result) > MAX_NUMBER)
+        large = np.flatnonzero(np.abs(result) > LARGEST_NUMBER)
         if len(large):
             self._next = begin + int(large[0]) + 1
             self.fail(
                 f"'{words[int(large[0])][:30]}' is too large: numbers of an IES file lie within "
-                f"{MAX_NUMBER:g} of 0 (reading {name})"
+                f"{LARGEST_NUMBER:g} of 0 (reading {name})"
             )
         self._next = begin + len(words)
         if len(words) < count:

@@ -17,7 +17,7 @@ from optisense.near import near_match, suggestion
 from optisense.text import brief
 
 MAX_SHOWN = 8
-"""Number of problems that a message lists, to fit a terminal; the others are counted."""
+"""Number of problems or differences that a message lists, to fit a terminal; others are counted."""
 
 MAX_EXAMINED = 100
 """Largest number of problems of one file that are put into words; a damaged file may have hundreds
@@ -61,11 +61,15 @@ def _in_one(errors: list[Diagnostic], source: str, unseen: int = 0) -> DesignErr
     if len(errors) == 1 and not unseen:
         only = errors[0]
         return DesignError(only.message, where=only.where, hint=only.hint)
-    shown = "\n".join(f"  {problem}" for problem in errors[:MAX_SHOWN])
-    count = len(errors) + unseen
-    more = count - min(len(errors), MAX_SHOWN)
-    shown += f"\n  and {more} more" if more > 0 else ""
-    return DesignError(f"{source} has {count} problems:\n{shown}")
+    shown = listed(list(map(str, errors)), unseen)
+    return DesignError(f"{source} has {len(errors) + unseen} problems:\n{shown}")
+
+
+def listed(texts: list[str], unseen: int = 0) -> str:
+    """Return the first of some texts, one per line, and how many more there are."""
+    more = len(texts[MAX_SHOWN:]) + unseen
+    lines = [*texts[:MAX_SHOWN], *([f"and {more} more"] if more else [])]
+    return "\n".join(f"  {line}" for line in lines)
 
 
 def design_error(

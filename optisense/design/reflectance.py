@@ -27,15 +27,12 @@ def fresnel_dielectric(cosine: ArrayLike, eta: float | FloatArray) -> FloatArray
 
 
 def fresnel_metal(cosine: ArrayLike, eta: ArrayLike, k: ArrayLike) -> FloatArray:
-    """Return the reflectance of a smooth metal for unpolarised light (Born and Wolf, 13.2).
+    """Return the reflectance (..., c) of a smooth metal for unpolarised light (Born and Wolf,
+    13.2).
 
     Args:
-        cosine: cosine of the angle of incidence, of any shape.
-        eta: real part (c,) of the metal's index divided by the index before it, by channel.
-        k: imaginary part (c,), divided likewise.
-
-    Returns:
-        Reflectance in the shape of `cosine` with (c,) added.
+        cosine: cosine (...) of the angle of incidence.
+        eta, k: real and imaginary part (c,) of the metal's index divided by the index before it.
     """
     ci = np.asarray(cosine, dtype=np.float64)[..., None]
     index = np.asarray(eta, dtype=np.float64) + 1j * np.asarray(k, dtype=np.float64)
@@ -64,17 +61,10 @@ def smith_shadowing(cosine: ArrayLike, alpha: float) -> FloatArray:
 
 
 def sample_facets(view: FloatArray, alpha: float, u: FloatArray) -> FloatArray:
-    """Sample normals of the facets visible from a direction, in the frame where +z is the mean
-    normal.
+    """Sample unit normals (n, 3) of the facets visible from unit directions (n, 3), z above 0, by
+    numbers (n, 2) from 0 to 1, in the frame where +z is the mean normal.
 
     Heitz, "Sampling the GGX distribution of visible normals", JCGT 7 (2018).
-
-    Args:
-        view: unit directions (n, 3), z above 0.
-        u: numbers (n, 2) from 0 to 1.
-
-    Returns:
-        Unit normals (n, 3).
     """
     stretched = view * [alpha, alpha, 1.0]
     stretched /= np.linalg.norm(stretched, axis=1, keepdims=True)

@@ -103,11 +103,8 @@ def is_in_full_view(mesh: TriangleMesh, bent: TriangleMesh) -> bool:
 
     Seen against its mean normal, all faces show the same side and the outline does not cross
     itself; a flat map with these two properties covers each point once. The sheet therefore has no
-    folds and does not touch itself. False means that this test is not conclusive.
-
-    Args:
-        mesh: the sheet at rest; its outline is kept for the next call.
-        bent: the same faces over moved vertices.
+    folds and does not touch itself. False means that this test is not conclusive. The outline of
+    the sheet at rest is kept for the next call.
     """
     outline = _outlines.get(mesh)
     if outline is None:

@@ -100,10 +100,7 @@ def repaired(mesh: TriangleMesh, name: str, closed: bool) -> tuple[TriangleMesh,
 def narrow_openings(mesh: TriangleMesh) -> str | None:
     """Return a clause that tells the openings of a surface that are narrower than it, so that the
     surface may be meant to be closed; None if there are none. The rim of a plain sheet is as wide
-    as the sheet.
-
-    Args:
-        mesh: welded mesh, mm.
+    as the sheet, and its mesh welded.
     """
     labels = shells(mesh)
     owner = np.zeros(len(mesh.vertices), dtype=np.int64)
@@ -118,13 +115,10 @@ def narrow_openings(mesh: TriangleMesh) -> str | None:
 
 
 def outward(mesh: TriangleMesh) -> TriangleMesh:
-    """Return a closed mesh whose bodies all look outward.
+    """Return a closed mesh, whose faces agree with their neighbours, with bodies that look outward.
 
     A shell inside another one is a cavity if it is drawn contrary to the outermost shell around it,
     and a body if it is drawn alike. Bodies may overlap.
-
-    Args:
-        mesh: closed mesh, whose faces agree with their neighbours.
     """
     labels = shells(mesh)
     cones = np.einsum("ij,ij->i", mesh.triangles[:, 0], mesh.face_vectors) / 6.0

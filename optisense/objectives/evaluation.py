@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from optisense.design import SensorDesign
 from optisense.design.camera_checks import camera_fault
 from optisense.design.lenses.film import PictureWindow
-from optisense.design.material_checks import index_problems
+from optisense.design.limits import index_problems
 from optisense.design.problems import Diagnostic
 from optisense.errors import ObjectiveError
 from optisense.geometry import Contact, Sphere

@@ -16,7 +16,7 @@ from optisense.design import Diagnostic, LightGroup, LightModel, Role, SensorDes
 from optisense.design.arrangement import one_medium
 from optisense.design.check import OPAQUE_ROLES
 from optisense.design.lights import frame_of
-from optisense.design.material_checks import is_gas
+from optisense.design.limits import is_gas
 from optisense.errors import OptiSenseError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import inside

@@ -14,7 +14,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from optisense.design.difference import listed, plain_differences
+from optisense.design.difference import plain_differences
+from optisense.design.problems import listed
 from optisense.errors import OutputError, TaskError
 from optisense.untrusted_files import COPY_AGAIN, read_json, read_table
 from optisense.writing import written_whole

@@ -7,7 +7,7 @@ import pytest
 import optisense as ots
 from optisense import library, sensors
 from optisense.design import SensorDesign, check_design, set_value
-from optisense.design.material_checks import index_problems
+from optisense.design.limits import index_problems
 from optisense.design.materials import Dielectric
 from optisense.errors import DesignError
 

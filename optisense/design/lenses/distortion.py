@@ -18,7 +18,7 @@ import numpy as np
 from pydantic import Field
 
 from optisense.array_types import FloatArray
-from optisense.design.fields import Number
+from optisense.design.fields import Fraction, Number
 from optisense.design.kinds import KindModel, Limits
 from optisense.errors import DesignError, LibraryError
 from optisense.registry import Registry
@@ -35,8 +35,6 @@ STEP = 1e-5
 
 SAME_SLOPE = 1e-4
 """Largest difference of derivatives, relative to the largest of them, that counts as rounding."""
-
-Share = Annotated[Number, Field(ge=0.0, le=1.0)]
 
 Coefficient = Annotated[Number, Field(ge=-1e6, le=1e6)]
 
@@ -63,7 +61,7 @@ class LensDistortion(KindModel):
     """Projection of the lens without distortion."""
 
     kind: str
-    centre: tuple[Share, Share] = Field(
+    centre: tuple[Fraction, Fraction] = Field(
         default=(0.5, 0.5),
         description="point where the lens's axis meets the picture, in shares of its width and "
         "height from the top left",

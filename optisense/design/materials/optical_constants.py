@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.design.reflectance import fresnel_dielectric
 
 CHANNEL_WAVELENGTHS = (630.0, 528.0, 465.0)
@@ -16,10 +16,8 @@ common red, green and blue LEDs. Metals of the library are given at the same one
 SODIUM_LINE = 589.3
 """Wavelength of the yellow sodium line, nm, at which refractive indices are stated."""
 
-Array = NDArray[np.float64]
 
-
-def sellmeier_index(b: Sequence[float], c: Sequence[float], wavelength: object) -> Array:
+def sellmeier_index(b: Sequence[float], c: Sequence[float], wavelength: object) -> FloatArray:
     """Return the refractive index by Sellmeier's formula, n^2 = 1 + sum of B L^2 / (L^2 - C).
 
     Args:
@@ -36,7 +34,7 @@ def sellmeier_index(b: Sequence[float], c: Sequence[float], wavelength: object) 
         return np.asarray(np.sqrt(1.0 + np.sum(terms, axis=0)))
 
 
-def cauchy_index(coefficients: Sequence[float], wavelength: object) -> Array:
+def cauchy_index(coefficients: Sequence[float], wavelength: object) -> FloatArray:
     """Return the refractive index by Cauchy's formula, n = A + B / L^2 + C / L^4.
 
     Args:
@@ -48,7 +46,7 @@ def cauchy_index(coefficients: Sequence[float], wavelength: object) -> Array:
     return np.asarray(np.sum(powers, axis=0))
 
 
-def absorption_of_extinction(k: Sequence[float]) -> Array:
+def absorption_of_extinction(k: Sequence[float]) -> FloatArray:
     """Return the absorption coefficient 4 pi k / wavelength at R, G, B, (3,), 1/mm.
 
     Args:
@@ -59,7 +57,7 @@ def absorption_of_extinction(k: Sequence[float]) -> Array:
 
 def absorption_of_plate(
     transmittance: Sequence[float], thickness: float, index: Sequence[float]
-) -> Array:
+) -> FloatArray:
     """Return the absorption coefficient (3,), 1/mm, of a plate with a measured transmittance.
 
     Light meets the polished plate at normal incidence in air. Each face reflects R = ((n - 1) /

@@ -14,6 +14,7 @@ from optisense.array_types import FloatingArray
 from optisense.design.colour import encode, srgb_curve
 from optisense.design.fields import NonNegative, Positive
 from optisense.design.kinds import ROUNDING, KindModel, Limits
+from optisense.design.lenses.blur import REACH
 from optisense.errors import DesignError
 from optisense.registry import Registry
 
@@ -33,9 +34,6 @@ LEVELS = Limits("an array in the shape of the levels, 0 to 1", RAMP, 0.0, 1.0 + 
 MAX_EXCESS = 4.0
 """Largest excess over the full well that the mask counts, as a multiple of a full pixel, so that a
 lamp in view does not whiten the whole picture."""
-
-BLUR_REACH = 4.0
-"""Radius at which the blur of overexposure is cut off, in standard deviations (SciPy's default)."""
 
 SPARE = 2
 """Margin of the blur's radius, in pixels, for its rounding."""
@@ -155,7 +153,7 @@ class FullWellResponse(CameraResponse):
 
     def reach(self, width: int) -> int:
         """Return the radius of the blur, in pixels."""
-        return int(BLUR_REACH * self.blur * width) + SPARE
+        return int(REACH * self.blur * width) + SPARE
 
     def spreads(self, exposed: FloatingArray) -> bool:
         """Return whether a pixel of exposed levels (h, w, 3) is overexposed."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design import Role, SensorDesign
-from optisense.design.material_checks import is_gas
+from optisense.design.limits import is_gas
 from optisense.geometry import TriangleMesh
 from optisense.geometry.coincidence import find_coincident
 from optisense.geometry.mesh_points import closest_points

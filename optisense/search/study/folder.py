@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from optisense.design import SensorDesign, load_design, save_design
-from optisense.design.difference import differences_from, fingerprint, listed, plain_differences
+from optisense.design.difference import differences_from, fingerprint, plain_differences
+from optisense.design.problems import listed
 from optisense.design.storage import files_of
 from optisense.errors import SearchError
 from optisense.folders import LOCK_FILE, FolderLock

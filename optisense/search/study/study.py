@@ -18,13 +18,8 @@ from pathlib import Path
 from typing import Any
 
 from optisense.design import SensorDesign
-from optisense.design.difference import (
-    differences,
-    fingerprint,
-    listed,
-    notes,
-    plain_differences,
-)
+from optisense.design.difference import differences, fingerprint, notes, plain_differences
+from optisense.design.problems import listed
 from optisense.errors import ObjectiveError, SearchError
 from optisense.folders import FolderLock
 from optisense.library import with_own_lights
