@@ -96,14 +96,6 @@ def test_tangents_on_a_fingertip_follow_its_meridians() -> None:
         np.testing.assert_allclose(np.cross(normals, first), -second, atol=1e-9)
 
 
-def test_tangents_of_a_flat_surface_are_its_axes() -> None:
-    mesh = TriangleMesh.grid((20.0, 16.0), (7, 6), height=0.3).flipped()
-    surface = SensingSurface(mesh, (1, 2, 5), (1, 0, 0.2), (0.3, 1, 0))
-    first, second = surface.tangents(np.array([[0.0, 0.0, -1.0]]))
-    np.testing.assert_allclose(first, [[1, 0, 0]], atol=1e-12)
-    np.testing.assert_allclose(np.abs(second), [[0, 1, 0]], atol=1e-12)
-
-
 def test_off_the_edge_says_how_far_the_edge_is() -> None:
     surface = bent(8.0, ball=False)
     with pytest.raises(ContactError, match=r"\(12, 0\).*10\.00 mm"):
