@@ -240,15 +240,14 @@ def refuse_odd_units(
         return notes
     given = units or "mm"
     number = whole / MM_PER[given]
-    fitting = [
-        f"{unit} (then it is {number * MM_PER[unit]:.3g} mm)" for unit in likely_units(number)
-    ]
+    likely = likely_units(number)
+    fitting = [f"{unit} (then it is {number * MM_PER[unit]:.3g} mm)" for unit in likely]
     large = f"{whole:.4g} mm" if whole < 1e4 else f"{whole / 1000:.4g} m"
     raise MeshError(
         f"the sensor would be {large} large if its files are in {given}",
         where=", ".join(meshes),
         hint=("The files look as if they were in " + " or ".join(fitting) + ": give --units "
-              + likely_units(number)[0] + ", or units: in the recipe")
+              + " or ".join(likely) + ", or units: in the recipe")
         if fitting
         else "Look up the export units in the CAD tool, and give them with --units",
     )  # fmt: skip

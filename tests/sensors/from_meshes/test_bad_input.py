@@ -99,7 +99,7 @@ class TestFiles:
         assert "STL, OBJ, PLY or STEP" in str(error_of(file).hint)
 
     @pytest.mark.parametrize(
-        ("scale", "units"), [(0.001, "units"), (1 / 25.4, "inch"), (1e3, "um")]
+        ("scale", "units"), [(0.001, "units m,"), (1 / 25.4, "units cm or inch,"), (1e3, "um")]
     )
     def test_units_that_are_plainly_not_mm(self, cad: Any, scale: float, units: str) -> None:
         error = error_of(cad.write(scale=scale))
