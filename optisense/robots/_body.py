@@ -93,9 +93,10 @@ class SensorBody:
         camera_middle: place (across, down) of the camera's axis in the picture, in shares of its
             width and height.
         resolution: width and height of the picture, pixels.
-        skin: pose of the skin: the origin is its point next to its centroid (of several, the one
-            farthest to the right in the picture), z points out of the sensor and x as near to the
-            right of the picture as it can, or to its top if z points to the right.
+        skin: pose of the skin, which consists of all sensing surfaces: the origin is its point next
+            to its centroid (of several, the one farthest to the right in the picture), z points out
+            of the sensor and x as near to the right of the picture as it can, or to its top if z
+            points to the right.
         skin_box: middle and half the sides of a box around the skin, in the skin's frame, m.
         friction: friction of the gel.
         notes: what a user must know, one sentence each.
@@ -140,9 +141,10 @@ def sensor_body(
             small that the inertia is none; or a density is of no solid part.
     """
     made = shapes(design)
-    skin = next((each.mesh for each in made if each.role is Role.SENSING_SURFACE), None)
-    if skin is None:
+    skins = [each.mesh for each in made if each.role is Role.SENSING_SURFACE]
+    if not skins:
         raise DesignError("the design has no sensing surface", where=design.where("parts"))
+    skin = TriangleMesh.joined(skins)
     solids = [each for each in made if each.is_solid]
     given = dict(densities or {})
     _check(design, solids, mass, given)

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from optisense import sensors
@@ -18,6 +19,7 @@ from optisense.geometry import TriangleMesh
 from optisense.geometry.solids import as_manifold
 from optisense.robots import RobotFormat, SensorBody, export_robot, sensor_body
 from optisense.robots._body import KILOGRAMS, _skin_frame, mass_properties
+from optisense.robots._collision import COVERED, depth_in
 from optisense.workshop.shapes import shapes
 
 mujoco = pytest.importorskip("mujoco")
@@ -182,6 +184,22 @@ def test_mujoco_reads_a_sheet_of_one_triangle_and_a_design_named_world(tmp_path:
     assert not any(note.startswith("skin has") for note in notes)
     model = mujoco.MjModel.from_xml_path(str(mjcf))
     assert model.body(1).name == mjcf.stem == "world-sensor"
+
+
+def test_all_skins_can_be_touched() -> None:
+    """The box of the touch sensor holds both, and no hull covers the second one."""
+    design = sensors.build("gelsight-mini-ideal")
+    back = TriangleMesh.grid((4.0, 4.0), (2, 2))
+    back = back.with_vertices(back.vertices - (0.0, 0.0, 50.0))
+    design.parts |= {"back": design.parts["skin"], "case": Part(role=Role.BLOCKER, mesh="case.obj")}
+    design.meshes.update({"back": back, "case": TriangleMesh.box((-9, -9, -52), (9, 9, -48))})
+    body = sensor_body(design)
+    middle, half = body.skin_box
+    for name in ("skin", "back"):
+        local = (1e-3 * design.meshes[name].vertices - body.skin.origin) @ body.skin.axes
+        assert (np.abs(local - middle) <= half + 1e-9).all()
+    hulls = [ConvexHull(1e3 * each.mesh.vertices) for each in body.hulls]
+    assert max(depth_in(back.vertices, hull).max() for hull in hulls) < COVERED
 
 
 def test_wrong_numbers_are_refused() -> None:
