@@ -132,16 +132,11 @@ CASES = [
     PatchCase("gelsight360", 1.0, referee=Referee.PATH, images=4),
 ]
 """Cases: flat and curved gels, the middle of the view and its corner (place 0), and coatings from
-diffuse to mirroring. Only `gelsight-mini`, which is fitted to a real one, has rough faces, with
-which light tracing does not work. The cylindrical gel is pressed by 0.3 mm, the depth of scores.
-Its reference needs three times as many photons as others, and its images ten times, as its contact
-is small and gets little red and blue light, and as the noise of an image is similar in neighbouring
-patches: a kernel is as wide as the contact. Those of the spherical gel and GelBelt need twice as
-many photons, and GelSight360 twice as many images. The narrow lobe of a specularity of 1 connects
-few photons to the camera, but leads many of the path tracer's paths to a lamp: in the contact of
-GelSight Mini, the noise of four million photons is 17 %, and that of 2,048 samples per pixel, which
-take a third of the time, 6 %.
-"""
+diffuse to mirroring. Only `gelsight-mini` has rough faces, with which light tracing does not work.
+The cylindrical gel is pressed by 0.3 mm, the depth of scores; its small contact gets little red and
+blue light, so that its reference needs three times as many photons and its images ten times. The
+narrow lobe of a specularity of 1 connects few photons to the camera, so that the path tracer is
+faster there."""
 
 
 @dataclass(frozen=True)

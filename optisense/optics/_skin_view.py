@@ -43,8 +43,8 @@ whose end points show the directions of the picture on the surface."""
 GRAZING = 5.0
 """Angle (degrees) between the camera's axis and the tangent plane at the origin from which on the
 camera's axes are directions on the surface. Below it, both project nearly onto one line, and a tilt
-of a fraction of a degree turns v around; the mirrors that show a surface to such a camera may turn
-the picture in any way. The axes of the built-in sensors meet the surface at 78 degrees or more."""
+of a fraction of a degree turns v around. The axes of the built-in sensors meet the surface at 78
+degrees or more."""
 
 UPWARD = 0.01
 """Distance (mm) by which the middle of what such a camera sees is moved up, as in the picture. On a

@@ -44,10 +44,9 @@ from optisense.optics.transport.chief_rays import sees_nothing, trace_chief_rays
 from optisense.quality import photons_of
 
 DRAG_PHOTONS = 0.25
-"""Share of a draft's photons that are traced while something moves; a draft of all photons follows
-at rest. On GelSight Mini, the error is then 10 % of the mean light while a light is dragged and
-14 % for a cage point, instead of 9 and 11 % with half of the photons, which take a tenth more time.
-With an eighth, it would be 12 and 21 %."""
+"""Share of a draft's photons that are traced while something moves. On GelSight Mini, the error is
+then 10 % of the mean light while a light is dragged and 14 % for a cage point; with half of the
+photons, which take a tenth more time, it would be 9 and 11 %."""
 
 CARRY_TOLERANCE = 2.0
 """Largest displacement of the undeformed skin (mm) up to which a draft moves a pressed skin along
@@ -86,9 +85,7 @@ class DraftView(SkinView):
         self._placed = lru_cache(maxsize=PLACED_CONTACTS)(super().place)
 
     def place(self, contact: Contact) -> TriangleMesh:
-        """Return the mesh of a contact's indenter, from the cache if it is known; see
-        `SkinView.place`.
-        """
+        """Return the mesh of a contact's indenter, a known one if there is any."""
         return self._placed(contact)
 
 

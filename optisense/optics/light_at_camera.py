@@ -35,9 +35,7 @@ class CameraLight:
     pupil: float | None
 
     def power(self, group: str) -> float | None:
-        """Return the power (mW) of a group that enters the lens; None if the design does not
-        specify the pupil.
-        """
+        """Return the power (mW) of a group that enters the lens; None if its pupil is unknown."""
         return None if self.pupil is None else self.irradiance[group] * self.pupil
 
     def as_text(self) -> dict[str, dict[str, str]]:

@@ -114,9 +114,7 @@ def _rough_mirrors(design: SensorDesign) -> dict[str, float]:
 
 
 def views_in_words(views: dict[frozenset[str], float]) -> str:
-    """Return a sentence part that names the sets of mirrors by which the camera sees the sensing
-    surface, the most used first.
-    """
+    """Return words that name the sets of mirrors of the camera's views, the most used first."""
     phrases = []
     for way, share in sorted(views.items(), key=lambda each: -each[1]):
         names = " and ".join(f"'{name}'" for name in sorted(way))

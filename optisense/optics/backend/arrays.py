@@ -25,9 +25,7 @@ Dr.Jit compiles other kernels."""
 
 
 def gathered(value: Value, lanes: mi.UInt32) -> Value:
-    """Return the given lanes of an array, or of each array of a dataclass; fields that are None
-    stay None.
-    """
+    """Return the given lanes of an array, or of the arrays (not None) of a dataclass."""
     if value is None:
         return value
     if is_dataclass(value) and not isinstance(value, type):

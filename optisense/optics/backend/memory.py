@@ -81,9 +81,7 @@ def _trim() -> None:
 
 
 def resident() -> float:
-    """Return the resident memory (bytes) of this process; infinity if the system does not report
-    it.
-    """
+    """Return the resident memory (bytes) of this process; infinity if it is unknown."""
     try:
         pages = int(Path("/proc/self/statm").read_text().split()[1])
     except (OSError, ValueError, IndexError):

@@ -53,9 +53,7 @@ def baker_transform(value: mi.Float) -> mi.Float:
 
 
 def next_random(state: mi.UInt32) -> mi.UInt32:
-    """Return the next state (n,) of a linear congruential generator, with the constants of PCG
-    (O'Neill 2014).
-    """
+    """Return the next state (n,) of a linear congruential generator (PCG, O'Neill 2014)."""
     return state * 747796405 + 2891336453
 
 
@@ -71,9 +69,7 @@ def sequence_4d(index: mi.UInt32, stream: mi.UInt32, seed: mi.UInt32) -> tuple[m
 
 
 def sequence_2d(index: mi.UInt32, stream: mi.UInt32, seed: mi.UInt32) -> mi.Point2f:
-    """Return an element of a two-dimensional sequence, a point of the unit square; see
-    `sequence_4d`.
-    """
+    """Return a point of the unit square of a two-dimensional sequence; see `sequence_4d`."""
     return mi.Point2f(*_element(STEPS_2D, index, stream, seed))
 
 

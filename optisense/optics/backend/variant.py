@@ -135,9 +135,7 @@ def _loops_rewritten_on_first_call() -> Iterator[None]:
 
 
 def cuda_device_found() -> bool:
-    """Return whether Dr.Jit finds a CUDA device and the driver has the OptiX library for ray
-    tracing.
-    """
+    """Return whether Dr.Jit finds a CUDA device and its driver has the OptiX library."""
     if sys.platform == "darwin" or not _cuda_driver_present():
         return False
     drjit = import_renderer("drjit")
@@ -145,9 +143,7 @@ def cuda_device_found() -> bool:
 
 
 def one_scene_per_kernel() -> bool:
-    """Return whether a kernel of the current variant can trace rays in only one scene, which is so
-    with OptiX.
-    """
+    """Return whether a kernel can trace rays in only one scene, which is so with OptiX."""
     return str(import_renderer("mitsuba").variant()).startswith("cuda")
 
 

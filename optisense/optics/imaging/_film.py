@@ -108,9 +108,7 @@ def box_around(where: NDArray[np.bool_], margin: int) -> tuple[slice, slice]:
 
 
 def averaged_twice(image: NDArray[np.floating], side: int) -> NDArray[np.floating]:
-    """Return an image (h, w) averaged twice over a square of an odd side (pixels); it is 0 beyond
-    its edges.
-    """
+    """Return an image (h, w), 0 beyond its edges, averaged twice over a square (odd, pixels)."""
     for _ in range(2):
         image = ndimage.uniform_filter(image, side, mode="constant")
     return image

@@ -73,9 +73,7 @@ def agreed(layers: FloatingArray, where: BoolArray) -> BoolArray:
 
 
 def fill(layers: NDArray[np.float32], where: BoolArray) -> None:
-    """Replace the pixels of a mask in ``layers`` (groups, h, w, 3) by the mean of their even
-    neighbours.
-    """
+    """Replace pixels of a mask in ``layers`` (groups, h, w, 3) by the mean of even neighbours."""
     for odd, corners in _places(where):
         mean = sum(layers[:, c[0], c[1]] for c in corners) / np.float32(len(corners))
         layers[:, odd[0], odd[1]] = np.where(where[odd][..., None], mean, layers[:, odd[0], odd[1]])

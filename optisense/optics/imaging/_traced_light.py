@@ -33,11 +33,9 @@ from optisense.optics.transport.camera_paths import (
 )
 
 CONTACT_RAYS = 4.0
-"""Number of rays from contacts for each photon of the cache. At a specularity of 1, the noise of
-contacts is that of these rays alone. With four, an image of GelSight Mini with 300,000 photons has
-a noise of 2.3 % over patches of the contact, about that of a diffuse coating with 560,000; with
-one, the same noise takes three times the time. On GelSight360, where photons and rays of the skin
-take most of the time, images with one take as long and have twice the noise."""
+"""Number of rays from contacts for each photon of the cache. With four, the noise over patches of a
+contact of GelSight Mini of specularity 1 is 2.3 % with 300,000 photons, about that of a diffuse
+coating with 560,000; with one, the same noise takes three times the time."""
 SCORE_RAYS = 1.0
 """The same in images of contacts alone, which scores take from a cache of many photons. With five
 million on GelSight Mini, the noise over patches is 1.2 %, as that of a diffuse coating; four rays
@@ -45,16 +43,13 @@ for each photon would triple the time of a score."""
 MOST_RAYS = 2_000_000
 """Largest number of rays that are traced together; their light takes up to 200 MB."""
 BENT_RAYS = 1.0
-"""Number of rays from elastic skin that is bent beside contacts for each photon of the cache. Such
-skin shows lamps as contacts do, and is as bright. On GelSight Mini with a million photons, the
-noise of pixels within 4 pixels of a contact is 6 to 9 %, and 17 % within 8; with an eighth as many
-rays, it is 16 to 19 % and 50 %, visible as coloured specks. If the rays end on the skin that they
-meet, the noise is three times as large."""
+"""Number of rays from elastic skin that is bent beside contacts for each photon of the cache. On
+GelSight Mini with a million photons, the noise of pixels within 4 pixels of a contact is 6 to 9 %;
+with an eighth as many rays, it is 16 to 19 %, visible as coloured specks."""
 NEAR_RAYS = 0.15
 """Number of rays from other pixels around contacts (`PixelRegions.near`) for each photon. With a
 fifth as many, the means of quarters of the skin around a contact of GelSight360 have a noise of 9
-to 20 instead of 2 to 3 %, with two million photons. With a third as many, pixels beside a contact
-of GelSight Svelte have a noise of 36 instead of 15 % with 300,000 photons, visible as specks."""
+to 20 instead of 2 to 3 %, with two million photons."""
 BESIDE_RAYS = 0.2
 """Number of rays from the skin within `BESIDE_RANGE` of contacts for each photon of the cache: two
 million photons give the mean of this skin a noise of 2 % on GelSight Mini."""
@@ -69,9 +64,8 @@ those from a point that it sees directly. On the skin around a contact of GelSig
 specularity 1, a tenth of the light comes from such points."""
 SKIN_WIDTH = 1 / 32
 """Width over which the light of traced peaks is averaged outside contacts, as a fraction of the
-image width: 0.6 mm on GelSight Mini, of whose lamps the lobes of flat skin show images that are
-blurred over 1 mm and more. Single rays that meet a lamp are bright: without the average, pixels of
-GelSight Svelte's skin of specularity 1 have a noise of 50 % with two million photons."""
+image width: 0.6 mm on GelSight Mini, whose flat skin blurs images of lamps over 1 mm and more.
+Without the average, pixels of GelSight Svelte's skin of specularity 1 have a noise of 50 %."""
 NEAR_WIDTH = 1 / 160
 """The same around contacts (`PixelRegions.near`), where the skin is bent or shows the contact and
 most of the blur is undone. With this blur, twice the width, and half the rays, the error of the
@@ -108,9 +102,7 @@ class LobeSamples:
 
     @classmethod
     def of_contacts(cls, pixels: NDArray[np.bool_], count: int, rays: float) -> LobeSamples:
-        """Return the samples of pixels that see contacts or bent skin, which draw a number of rays
-        together.
-        """
+        """Return samples of pixels on contacts or bent skin, which draw rays together."""
         passes = max(1, math.ceil(rays / MOST_RAYS))
         directions = _directions(rays / passes, pixels, count)
         return cls(pixels, count, directions, gathers=False, passes=passes)

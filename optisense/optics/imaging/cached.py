@@ -46,17 +46,16 @@ from optisense.optics.transport.chief_rays import ChiefRays
 
 SPARSE_SHADING_BEAMS = 1.5e7
 """Number of beams to sum for an image above which only every second pixel is shaded where the image
-is smooth. Summing so many beams takes about 0.2 s on two cores. Without the interpolation, an image
-of GelSight360 with a specularity of 0.6 from a finished cache takes 17 % longer, and the pictures
-differ by 2.5 % (RMS, at a noise of 10 %)."""
+is smooth; it takes about 0.2 s on two cores. Without the interpolation, an image of GelSight360
+with a specularity of 0.6 from a finished cache takes 17 % longer."""
 SPARSE_METALLIC_BEAMS = 4e6
 """Value of `SPARSE_SHADING_BEAMS` for metallic coatings. They take longer for each beam, as they
 evaluate a metallic lobe, and sum all beams, while diffuse ones sum those near indenters."""
 AVERAGED_ROUGHNESS = 0.18
 """GGX alpha of metallic lobes from which on interreflected light is averaged over pixels in
 contacts (see `INTERREFLECTION_WIDTH`). At 0.2 this reduces the noise of the camera samples in a
-contact of GelSight Mini from 2.6 to 1.1 % of the mean, with an error of 0.5 % (RMS over patches);
-the error grows as lobes become narrower."""
+contact of GelSight Mini from 2.6 to 1.1 %, with an error of 0.5 %, which is larger for narrower
+lobes."""
 BESIDE_RANGE = 0.1
 """Distance from a contact, as a fraction of the image width, within which the skin is shaded with
 light that the contact reflects to it: 2 mm on GelSight Mini. This is half a per cent of a diffuse

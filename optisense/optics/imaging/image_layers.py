@@ -52,9 +52,7 @@ class KnownView:
     faint: NDArray[np.float32] | None = None
 
     def with_faint(self, layers: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return layers (groups, h, w, 3) with the faint light, which is a fixed share of each
-        group's light.
-        """
+        """Return layers (groups, h, w, 3) with the faint light, a fixed share of a group's."""
         assert self.faint is not None
         return layers + self.faint * _means(layers)
 

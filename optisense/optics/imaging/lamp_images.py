@@ -19,10 +19,9 @@ from optisense.optics.transport.camera_paths import film_samples, find_visible_p
 SEARCH_WIDTH = 160
 """Width (pixels) of the image in which mirror images of lamps are looked for."""
 LAMP_PATHS = 8
-"""Number of paths through each pixel of an image of this width that look for lamps. Finer images
-have fewer, in inverse proportion to their width. The paths are traced once for all images of a
-sensor, and not shaded: 0.02 s for an image of 160x120 pixels of GelSight Mini. Of the built-in
-sensors, only GelSight360 shows mirror images of lamps, which these paths meet 30 times."""
+"""Number of paths through each pixel of an image of this width that look for lamps; finer images
+have fewer, in inverse proportion to their width. They are traced once for all images of a sensor,
+in 0.02 s for 160x120 pixels of GelSight Mini."""
 GLINT_PATHS = 64
 """Number of further paths through the pixels around a lone bright pixel, of which there are few."""
 STEADY_SHARE = 1 / 8
@@ -36,8 +35,7 @@ that must be bright for the pixel not to count as lone."""
 LONE_RATIO = 2.0
 """Ratio of a pixel's light to that of the `LONE_RANK`-th brightest pixel in its square above which
 the excess light is spread over the pixels around it. A factor of two is more than the noise between
-neighbouring pixels of a real reflection. Of the built-in sensors, only GelSight360 shows such
-pixels: without the spreading, its picture of 160x120 pixels differs by 6 % (RMS)."""
+neighbouring pixels of a real reflection."""
 SPECK_WIDTH = 1.0 / 8.0
 """Width over which that excess is spread, as a fraction of the image width; a speck of 50 times the
 light around it then adds 3 % to its middle."""

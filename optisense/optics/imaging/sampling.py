@@ -20,9 +20,8 @@ an image `REFERENCE_WIDTH` wide. Twelve keep the noise of the samples below 1 % 
 1.5 mm ball on GelSight Mini. Finer images have smaller pixels and take fewer."""
 MIN_CONTACT_SAMPLES = 16_000
 """Lower bound on the number of camera samples in all contacts together: that of 1,300 pixels of
-twelve samples. If contacts fill fewer pixels, tilt and shadow vary more within each pixel, and each
-gets more samples; without it, the error in a contact of GelBelt is 16 % larger
-(benchmarks/ablation.md)."""
+twelve samples. In fewer pixels, tilt and shadow vary more; without it, the error in a contact of
+GelBelt is 16 % larger (benchmarks/ablation.md)."""
 RIM_SAMPLES = 6
 """Number of camera samples per pixel around contacts, in an image `REFERENCE_WIDTH` wide: half of
 those inside, as the skin is not tilted there."""
@@ -37,20 +36,16 @@ RIM_WIDTH = 8.0 / 320.0
 mm on GelSight Mini, about the depth of a contact."""
 INTERREFLECTION_WIDTH = 1.0 / 107.0
 """Width over which interreflected light is averaged in contacts of coatings with broad metallic
-lobes, as a fraction of the image width: 3 pixels of 320. In a contact of GelSight Mini of
-specularity 0.6, where interreflection is a tenth of the light, this reduces the noise of the camera
-samples from 3.0 to 1.1 % of the mean. As the blur is undone by twicing, the error over patches is
-0.1 instead of 0.5 %. Pixels of small contacts have more samples, so that averages over a smaller
-width have about as many. In contacts of a ball on GelSight Svelte, 14 pixels wide, the error is 1.1
-% instead of the 2.3 % of the full width."""
+lobes, as a fraction of the image width: 3 pixels of 320, and less in small contacts, whose pixels
+have more samples. In a contact of GelSight Mini of specularity 0.6 it reduces the noise of the
+camera samples from 3.0 to 1.1 % of the mean, with an error over patches of 0.1 %."""
 
 PixelImportance = Callable[[ChiefRays], NDArray[np.bool_] | NDArray[np.floating]]
 """A function of the chief rays that gives the importance (h, w) of each contact pixel to a score,
 0 to 1: the share of the camera samples that it gets."""
 GRAIN_SAMPLES = 4
 """Largest number of further camera samples per pixel in grainy places outside contacts, which
-halves the grain; they are limited to half of the image's samples. A sample reads one cell of the
-cache, so that neighbouring cells that differ much show as grain. Without them, the error outside
+halves the grain; they are limited to half of the image's samples. Without them, the error outside
 the contact of GelSight Svelte is 21 % larger (benchmarks/ablation.md)."""
 OUTLINE_SAMPLES = 9
 """Number of camera samples per pixel at the outline of the skin, such as the edge of a

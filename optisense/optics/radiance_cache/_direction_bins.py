@@ -85,9 +85,7 @@ contact of GelSight Mini of specularity 0.3 is 2.5 % off instead of 1.8 %."""
 CURVED_BINS = DirectionBins(18, 0.6, True)
 """The bins for diffuse coatings and broad lobes on curved surfaces, in front of which light varies
 faster. In a contact of the diffuse spherical GelSight Mini the RMS error over patches is 3.1 % with
-16 x 16 bins, 2.0 % where their blur is undone bin by bin, and 1.3 % with these. Tracing the light
-takes a quarter longer; images from a finished cache take as long as with `COARSE_BINS`. The noise
-is 1.2 to 1.3 times as large, but error and noise together are not (see docs/performance.md)."""
+16 x 16 bins and 1.3 % with these, whose light takes a quarter longer (see docs/performance.md)."""
 FINE_BINS = DirectionBins(24, 0.6, True)
 """The bins for lobes that resolve the lamps: 576 bins, 8.5 degrees across in the mean."""
 FINEST_BINS = DirectionBins(32, 0.6, True)
@@ -104,10 +102,8 @@ NARROW_LOBE = 0.25
 `two_discs`)."""
 FINEST_LOBE = 0.18
 """GGX alpha below which the finest bins are needed. At 0.2, the error in a contact of GelSight Mini
-is 2.1 % with `FINE_BINS` and 1.9 % with `FINEST_BINS`, and on the skin around it 0.9 and 0.3 %; an
-image with a million photons takes 0.7 times as long with `FINE_BINS`. If beams were single discs,
-the errors would be 2.8 and 1.5 %. At 0.05, the error in the contact is 5 % with `FINEST_BINS` and
-9 % with the next coarser ones."""
+is 2.1 % with `FINE_BINS` and 1.9 % with `FINEST_BINS`, and an image takes 0.7 times as long with
+the former; at 0.05, it is 9 and 5 %."""
 
 
 def direction_bin(

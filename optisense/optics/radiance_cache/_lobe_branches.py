@@ -18,26 +18,21 @@ from optisense.optics.transport.camera_paths import (
 from optisense.optics.transport.interact import LobeSample, RayKind
 
 MOST_SCATTERED = 8
-"""Largest number of rays into which a ray is split at a rough interface. The rays of all splits
-are about as many as those that are followed. In the contact of GelSight Mini of specularity 1, most
-of the noise of rays is from the scattering at the rough edges of the light guide: splitting reduces
-the noise of pixels from 27 to 20 %, on the skin far from it from 16 to 12 %, and takes a fifth more
-time."""
+"""Largest number of rays into which a ray is split at a rough interface. In the contact of GelSight
+Mini of specularity 1, where most of the noise is from the rough edges of the light guide, splitting
+reduces the noise of pixels from 27 to 20 %, and takes a fifth more time."""
 BRANCH_FACTOR = 2.0
 """Ratio of the probability with which the reflection of a ray at interfaces is followed to the
-weight of that reflection, for rays from contacts. In the contact of the flat GelSight Mini of
-specularity 1, the noise over patches is 2.5 % with 300,000 photons. It is 2.6 % with a factor of 1,
-and 2.4 % in a tenth more time with a factor of 4.
-"""
+weight of that reflection, for rays from contacts. With 2, the noise in the contact of GelSight Mini
+of specularity 1 is 2.5 %; with 4, it is 2.4 % in a tenth more time."""
 SPLIT_SHARE = 1 / 16
 """Share of all rays up to which those that meet an indenter first are split into several. Few rays
 from the skin do, and the contact is bright: on the skin around a contact of GelSight Mini of
 specularity 1, splitting reduces the noise from 17 to 10 %."""
 MOST_CACHED = 2_500
 """Largest number of places on the skin whose cached light is summed at each reflection; if rays
-meet more, a part of them is drawn. The sum over beams takes up to ten times as long as a ray, on
-GelSight360 with its nine light groups. With 10,000, the noise of contacts is the same, and images
-take up to a tenth longer."""
+meet more, a part of them is drawn. With 10,000, the noise of contacts is the same, and images of
+GelSight360 take up to a tenth longer."""
 MOST_GATHERED = 40_000
 """The same where rays end. With 10,000, the noise of the skin of GelSight Mini far from contacts is
 19 instead of 16 %."""

@@ -58,9 +58,7 @@ class PilotPhotons:
         )
 
     def cells_of(self, cells: SurfaceCells) -> tuple[NDArray[np.integer], NDArray[np.bool_]]:
-        """Return the cell (n,) of each landing, and a mask (n,) of the landings that lie in a
-        cell.
-        """
+        """Return the cell (n,) of each landing, and a mask (n,) of those that lie in one."""
         point = mi.Point3f(*(floats(self.points[:, k]) for k in range(3)))
         cell, found = cell_at(cells, point, mi.Bool(True))
         dr.eval(cell, found)
@@ -80,9 +78,7 @@ class PilotPhotons:
         return np.asarray(power, dtype=np.float64).reshape(2, -1, groups)
 
     def grazing_share(self) -> float:
-        """Return the share of the flux across the light that lands at a cosine below
-        `GRAZING_COSINE`.
-        """
+        """Return the share of flux across the light that lands below `GRAZING_COSINE`."""
         across = self.powers / np.maximum(self.cosines, MIN_COSINE)
         grazing = self.cosines < GRAZING_COSINE
         return float(across[grazing].sum() / max(across.sum(), 1e-30))

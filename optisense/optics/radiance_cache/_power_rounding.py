@@ -18,9 +18,9 @@ from optisense.optics.backend.sequences import unit_float
 
 QUANTA_PER_PHOTON = 8192
 """Number of quanta of power in a photon as it is emitted. Single precision adds up to 2^24 quanta
-exactly, the light of 2,048 such photons in one direction bin of a cell; brighter sums are rounded
-as usual. The brightest bin of GelSight Mini holds 0.17 of this with 5 million photons, and that of
-GelBelt 0.26 with 1 million. The rounding changes the power of a photon by less than 0.01 %."""
+exactly, the light of 2,048 such photons in one direction bin of a cell; the brightest bin of
+GelSight Mini holds 0.17 of this with 5 million photons. The power of a photon changes by less than
+0.01 %."""
 LEAST_QUANTA = 32
 """Number of quanta below which photons are kept at random, with this power. Fewer quanta would not
 represent the direction of a photon: the largest error of a component is one quantum."""
@@ -54,9 +54,7 @@ class PowerRounding:
         return cls(dr.opaque(mi.Float, quantum), dr.opaque(mi.Float, 1 / quantum), chances)
 
     def kept(self, power: mi.Float) -> mi.Float:
-        """Return the factors (n,) of powers (n,), mW, by which weak photons become stronger or
-        vanish.
-        """
+        """Return factors (n,) of powers, mW, by which weak photons grow or vanish."""
         least = LEAST_QUANTA * self.quantum
         survives = self.chances[1] * least < power
         return dr.select(power < least, dr.select(survives, least / power, 0), 1)

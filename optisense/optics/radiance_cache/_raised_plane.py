@@ -26,10 +26,9 @@ from optisense.optics.scene.surface_cells import SurfaceCells, cell_at, plane_of
 from optisense.optics.transport.camera_paths import VisiblePoints
 
 RAISED_HEIGHT = 0.8
-"""Height (mm) of the raised plane, about the depth of usual contacts. In a contact of this depth
-near the lamps of GelSight Mini, means over patches are 3.0 % off; with 0.5 mm it is 3.5 %, and with
-1.1 mm 4.3 %. A third plane at 0.4 mm makes no difference. It is lower on small sensing surfaces
-(see `raised_height`)."""
+"""Height (mm) of the raised plane, about the depth of usual contacts; it is lower on small sensing
+surfaces (see `raised_height`). In a contact of this depth near the lamps of GelSight Mini, means
+over patches are 3.0 % off; with 0.5 mm it is 3.5 %, and with 1.1 mm 4.3 %."""
 STEPS = 2
 """Number of planes of cells that a line is intersected with in turn, where the surface is curved.
 With 8, the light in a contact of the spherical GelSight Mini is the same within 0.2 %."""

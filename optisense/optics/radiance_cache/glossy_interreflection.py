@@ -41,9 +41,8 @@ MAX_BOUNCES = 4
 light in the contact of a metal ball is left."""
 NEGLIGIBLE_SHARE = 0.005
 """Share of the first rays that are left, below which paths end; each further reflection of so few
-costs as much as that of many. In the contact of a ball on GelSight Mini, two reflections are then
-followed at a specularity of 0.6, and one at 1; further ones would add 0.01 % to its light at most,
-and 0.07 % at its rim."""
+costs as much as that of many. In the contact of a ball on GelSight Mini, further reflections would
+add 0.01 % to its light at most, and 0.07 % at its rim."""
 PLACE_SHADOW_RAYS = 4.0
 """Number of shadow rays per light group of a place that a ray meets: a quarter of those of visible
 points, as its light is a small part of a pixel's."""

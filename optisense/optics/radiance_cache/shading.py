@@ -53,9 +53,9 @@ class ShadingEffort:
 
 FULL_EFFORT = ShadingEffort(16.0, 32.0, 8)
 """The effort for a picture. A pixel in and near contacts has twelve samples or more, so that a
-shadow is known to half a per cent of the light (systematic sampling of 200 rays); elsewhere a pixel
-has fewer samples, and each has twice as many rays. With 1 cell, the error beside contacts is up to
-9 % larger, and no time is saved in a full picture (benchmarks/ablation.md)."""
+shadow is known to half a per cent of the light; elsewhere a pixel has fewer samples, and each has
+twice as many rays. With 1 cell, the error beside contacts is up to 9 % larger
+(benchmarks/ablation.md)."""
 DRAG_EFFORT = ShadingEffort(4.0, 6.0, 2)
 """The effort for drafts while something moves, which take an eighth less time. On GelSight Mini,
 their error grows by 0.6 % of the mean light while a light is dragged and by 1.7 % for a cage point,

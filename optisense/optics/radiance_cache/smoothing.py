@@ -55,9 +55,8 @@ a cell and reading from up to half a cell away is three box filters of a cell's 
 variance 1/12; the variance of Epanechnikov's kernel is 1/6 of its squared radius."""
 CACHED_BYTES = 6e5
 """Size (bytes) of the rows of a table that make one row of a product above which blocks of columns
-are multiplied: a third of a processor core's cache of 2 MB, as each row is used again for the rows
-of the result that follow. On GelSight360, these rows have 1.0 to 1.5 MB, and on the other built-in
-sensors with a diffuse coating at most 0.4 MB."""
+are multiplied: a third of a processor core's cache of 2 MB. These rows have 1.0 to 1.5 MB on
+GelSight360, and at most 0.4 MB on the other built-in sensors with a diffuse coating."""
 BLOCK_COLUMNS = 256
 """Number of columns in a block: 1 kB of a row. A product of GelSight360 (3,704 rows with 32 weights
 and 11,664 columns) takes 0.33 s of a processor in blocks and 0.86 s with whole rows, and a third

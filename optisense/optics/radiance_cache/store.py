@@ -49,9 +49,8 @@ the tally would exceed `MAX_TALLY_BYTES`, or where a large sensing surface (see 
 lamp within `NEAR_LAMP`."""
 NEAR_LAMP = 10.0
 """Distance (mm) from the nearest lamp to what the camera sees above which the cells of a large
-sensing surface grow with it, as the length over which light varies does. It is at most 8 mm on the
-built-in sensors. On a skin of 80 x 64 mm without a lamp within 16.5 mm, cells of 0.83 mm take a
-third of the time of the first picture that those of 0.5 mm take, with the same errors."""
+sensing surface grow with it, as the length over which light varies does; it is at most 8 mm on the
+built-in sensors. On a skin of 80 x 64 mm, the first picture then takes a third of the time."""
 PILOT_CELL_SIZE = 1.0
 """Side (mm) of the cells that decide whether a pilot photon lands where the camera looks: half of
 `VIEW_MARGIN`."""
@@ -79,10 +78,8 @@ MAX_CACHES = 2
 a user go back and forth between two sets of lights or seeds."""
 GRAZING_SHARE_LIMIT = 0.17
 """Share of grazing light above which indenters are lit by the volume flux above the surface as
-well. Without the volume flux, the error in a contact of GelSight Svelte, whose share is 0.42, would
-be three times as large (benchmarks/ablation.md). GelSight Mini with white walls around gel and tray
-has a share of 0.21, and its contacts would be 3 % too dark. The built-in sensors with less grazing
-light have 0.07 to 0.12; the volume flux would only add noise to them."""
+well. Without it, the error in a contact of GelSight Svelte, whose share is 0.42, would be three
+times as large (benchmarks/ablation.md); to sensors of 0.07 to 0.12, it would only add noise."""
 
 
 class _Traced(NamedTuple):

@@ -42,9 +42,9 @@ EMPTY_BIN_SHARE = 1e-7
 0.01 % of the light."""
 DENSE = 8000.0
 """Density of landed photons (1/mm^2) from which on the blur of the smoothing is undone in each
-direction bin, where there is a raised plane; 8 million photons give GelSight Mini as much. With so
-many, the noise is so low that 1.2 times as much is a good price. In a contact near its lamps, the
-error with 10 million photons is then 1.9 instead of 2.9 %."""
+direction bin, where there is a raised plane; 8 million photons give GelSight Mini as much. In a
+contact near its lamps, the error with 10 million is then 1.9 instead of 2.9 %, with 1.2 times the
+noise."""
 NOISIEST_SHARE = 0.05
 """Share of the area in view that counts as the worst places when their noise is reported: small
 enough to find a dark corner, and large enough not to depend on a few cells."""

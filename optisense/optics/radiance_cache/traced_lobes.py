@@ -61,10 +61,8 @@ MAX_REFLECTIONS = 16
 with four, the light in a contact of GelSight Mini of specularity 1 would be 2 % too weak."""
 BRANCHED_SEGMENTS = 2
 """Number of segments from coating to coating on which rays from contacts go through interfaces and
-branch there (see `follow_to_coating`). On later segments, which bring 4 % of the light in a contact
-of GelSight Mini of specularity 1, one way is drawn at each interface. With one segment
-instead of two, the noise of the contact of the flat GelSight Mini is a tenth larger; with none, it
-is a third larger in the same time; with three, it is the same."""
+branch there (see `follow_to_coating`); on later ones, one way is drawn. With one segment, the noise
+of the contact of the flat GelSight Mini is a tenth larger; with three, it is the same."""
 GUIDED_SHARE = 0.3
 """Share of the rays from the skin that are drawn from the beams of the cache. With 0.3, the noise
 of the skin of GelSight Mini of specularity 1 is 12 instead of 15 %; with 0.7, it is larger again,

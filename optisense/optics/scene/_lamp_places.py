@@ -198,9 +198,7 @@ def _meet(
 
 
 def window(number: int, emitter: Emitter) -> Piece:
-    """Return the emitting face of a light, which faces its direction; equal lights share one
-    object.
-    """
+    """Return the emitting face of a light along its direction; equal lights share an object."""
     return _window_of(
         number, emitter.shape, emitter.size, emitter.position, emitter.direction, emitter.up
     )

@@ -71,9 +71,7 @@ class Assembly:
 
 @dataclass
 class AssemblyCache(ShapeCache):
-    """Shapes computed from meshes, with the meshes that they were computed from, which are
-    recognised by identity.
-    """
+    """Shapes computed from meshes, which are recognised by identity, and these meshes."""
 
     merged: list[tuple[TriangleMesh, TriangleMesh]] = field(default_factory=list)
     pieces: list[tuple[TriangleMesh, Piece]] = field(default_factory=list)
@@ -260,9 +258,7 @@ def indenter_piece(mesh: TriangleMesh, coating: Surface) -> Piece:
 
 
 def is_mirror(reflection: Reflection) -> bool:
-    """Return whether a surface is a metal that is smooth enough to reflect images, and so counts as
-    a mirror.
-    """
+    """Return whether a surface is a metal smooth enough to reflect images, a mirror."""
     return reflection.is_metal and reflection.roughness < SMOOTH_METAL
 
 

@@ -17,10 +17,9 @@ from optisense.optics.scene.interfaces import ggx, ggx_of_disc, sample_ggx, smit
 
 PEAK_ANGLES = 0.12, 0.3
 """Angles (radians) between the half vector and the normal over which the peak of a narrow metallic
-lobe passes into its tail. At wide angles, few rays from the skin meet a lamp: with 0.3 and 0.5, the
-noise of the skin of GelSight Mini of specularity 1 is half as large again. Direction bins do not
-describe the lamps at narrow angles: with 0.08 and 0.2, the contact on GelSight Svelte is 1.2 % too
-dark instead of 0.4 %."""
+lobe passes into its tail. With 0.3 and 0.5, the noise of the skin of GelSight Mini of specularity 1
+is half as large again; with 0.08 and 0.2, the contact on GelSight Svelte is 1.2 % too dark instead
+of 0.4 %."""
 
 
 @dataclass
@@ -49,9 +48,7 @@ class CoatingBsdf:
 def coating_of(
     table: mi.Float, surface: mi.UInt32, active: mi.Bool, metallic: bool = True
 ) -> CoatingBsdf:
-    """Return the reflectance parameters, (n,) each, of surfaces; ``metallic`` as in
-    `CoatingBsdf`.
-    """
+    """Return reflectance parameters, (n,) each; ``metallic`` as in `CoatingBsdf`."""
     first = dr.gather(mi.Vector4f, table, surface * 4, active)
     base = dr.gather(mi.Vector4f, table, surface * 4 + 1, active)
     eta = dr.gather(mi.Vector4f, table, surface * 4 + 2, active)
@@ -75,9 +72,7 @@ def grey(colour: mi.Color3f) -> mi.Float:
 
 
 def albedo_of(coating: CoatingBsdf) -> mi.Color3f:
-    """Return the approximate albedo of a coating per channel, with its metal at normal
-    incidence.
-    """
+    """Return the approximate albedo per channel, with the metal at normal incidence."""
     metal = fresnel_metal(mi.Float(1), coating.metal_eta, coating.metal_k)
     return coating.reflectance * (1 - coating.specularity) + metal * coating.specularity
 
@@ -175,9 +170,7 @@ def evaluate_coating(
 def metal_reflectance(
     coating: CoatingBsdf, towards_light: mi.Vector3f, towards_eye: mi.Vector3f
 ) -> mi.Color3f:
-    """Return the Fresnel reflectance (3, n) of the metal of coatings, for unit directions away from
-    the surface.
-    """
+    """Return the Fresnel reflectance (3, n) of coatings' metals, for outward unit directions."""
     half = dr.normalize(towards_light + towards_eye)
     cosine = dr.abs(dr.dot(half, towards_light))
     return fresnel_metal(cosine, coating.metal_eta, coating.metal_k)

@@ -37,9 +37,7 @@ class ContactScenes:
     absorption: mi.Color3f | None = None
 
     def in_one_scene(self) -> ContactScenes:
-        """Return the same ray scenes with their meshes in a single scene of Mitsuba, as OptiX needs
-        (`share_scene`).
-        """
+        """Return the scenes with their meshes in one of Mitsuba's, for OptiX (`share_scene`)."""
         apart = [self.full, self.fixed, *([] if self.indenters is None else [self.indenters])]
         full, fixed, *indenters = share_scene(apart)
         return replace(self, full=full, fixed=fixed, indenters=next(iter(indenters), None))

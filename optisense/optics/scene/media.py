@@ -245,9 +245,7 @@ def _interface(mesh: TriangleMesh, solid: Solid, neighbour: Solid | None) -> Int
 
 
 def same_faces(one: TriangleMesh, other: TriangleMesh) -> bool:
-    """Return whether meshes have the same triangles, regardless of the positions of their
-    vertices.
-    """
+    """Return whether meshes have the same triangles, wherever their vertices are."""
     return one is other or (
         len(one.vertices) == len(other.vertices) and np.array_equal(one.faces, other.faces)
     )

@@ -59,9 +59,7 @@ class Piece:
 
     @cached_property
     def rows(self) -> NDArray[np.float32]:
-        """Return rows (m, 4): the unit normal of each face, and a place for the surface's
-        number.
-        """
+        """Return rows (m, 4): the unit normal of each face, and room for a surface's number."""
         a, b, c = (self.vertices[self.faces[:, i]] for i in range(3))
         cross = np.cross(b - a, c - a)
         length = np.linalg.norm(cross, axis=1)
@@ -79,9 +77,7 @@ class Piece:
 
     @cached_property
     def corners(self) -> NDArray[np.float32]:
-        """Return the corner normals (m, 3, 4) on the side of the face normal, padded to four
-        floats.
-        """
+        """Return corner normals (m, 3, 4) on the face normal's side, padded to four floats."""
         corners = np.zeros((len(self.faces), 3, 4), dtype=np.float32)
         if self.normals is not None:
             corners[:, :, :3] = self.normals[self.faces]
@@ -217,9 +213,7 @@ class RayScene:
 
     @property
     def channels(self) -> tuple[int | None, ...]:
-        """The channels that need separate rays; None stands for all channels that share their
-        rays.
-        """
+        """The channels that need separate rays; None for those that share their rays."""
         return (0, 1, 2) if self.dispersive else (None,)
 
     @cached_property
@@ -232,9 +226,7 @@ class RayScene:
         return indices(np.concatenate(numbers))
 
     def with_table(self, table: mi.Float) -> RayScene:
-        """Return a scene of the same triangles with other optical data, a table (16 n,) of
-        `surface_table`.
-        """
+        """Return a scene of the same triangles with another `surface_table` (16 n,)."""
         other = copy(self)
         other.table = table
         return other
@@ -330,9 +322,7 @@ def _mesh(vertices: NDArray[np.float32], faces: NDArray[np.integer]) -> mi.Mesh:
 
 
 def leave(point: mi.Point3f, normal: mi.Vector3f, direction: mi.Vector3f) -> mi.Point3f:
-    """Return the origin of a ray that leaves a surface, `RAY_OFFSET` off it on the side that
-    ``direction`` points to.
-    """
+    """Return the origin of a ray `RAY_OFFSET` off a surface, on the side of ``direction``."""
     side = dr.select(dr.dot(direction, normal) > 0, RAY_OFFSET, -RAY_OFFSET)
     return mi.Point3f(point + normal * side)
 

@@ -74,9 +74,7 @@ class Surface:
 
 
 def is_coloured(surface: Surface) -> bool:
-    """Return whether the properties of a surface or of a medium beside it differ between
-    channels.
-    """
+    """Return whether a surface or a medium beside it differs between channels."""
     if surface.etas is not None:
         return True
     metal = surface.specularity > 0 or surface.kind is SurfaceKind.MIRROR

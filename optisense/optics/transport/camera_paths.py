@@ -285,9 +285,7 @@ def find_visible_points(
 
 
 def generator(bits: mi.UInt32) -> mi.PCG32:
-    """Return random generators (n,) that depend on the given bits (n,) and not on the place in the
-    array.
-    """
+    """Return random generators (n,) that depend on given bits (n,) and on nothing else."""
     random = mi.PCG32()
     random.seed(mi.UInt64(bits), mi.UInt64(bits))
     return random

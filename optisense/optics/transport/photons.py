@@ -86,9 +86,7 @@ class Emission:
 
 @dataclass
 class TargetCells:
-    """Surface cells that photons should reach: ``flags`` is 1 in those in or near the camera's
-    view.
-    """
+    """Surface cells that photons should reach; ``flags`` is 1 in or near the camera's view."""
 
     cells: SurfaceCells
     flags: mi.UInt32

@@ -37,9 +37,7 @@ fine as a chart of directions shows them."""
 
 
 class LightWay(IntEnum):
-    """The interactions of light on its path to a place; a path with several counts as the last in
-    this list.
-    """
+    """The interactions of light on its path to a place, of which the last in this list counts."""
 
     REFRACTED = 0  # nothing but interfaces that let it pass
     REFLECTED = 1  # an interface that reflected it, totally or in part
