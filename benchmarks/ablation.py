@@ -15,7 +15,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from operator import itemgetter
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -38,11 +37,10 @@ from benchmarks.ablation_cases import (
 )
 from benchmarks.ablation_features import Ablation, ablations
 from benchmarks.patches import RING
-from benchmarks.results import machine, say_if_busy
+from benchmarks.results import machine, measured_on, page_head, say_if_busy, store, stored
 from optisense import OpticalModel
 from optisense.mechanics import CONFORMING
 
-FOLDER = Path(__file__).parent
 SEEDS = (1, 2)
 """Seeds of the images of a feature of shading."""
 LIGHT_SEEDS = (1, 2, 3)
@@ -111,11 +109,7 @@ class Measured:
 
 
 def _of_errors(squares: FloatArray) -> list[float]:
-    """Return the relative change of an error, and its standard error by the jackknife over seeds.
-
-    Args:
-        squares: squared errors (seeds, 2) with and without a feature.
-    """
+    """Return the change of an error, from squares (seeds, 2), and its jackknife standard error."""
 
     def change(some: FloatArray) -> float:
         with_it, without = np.sqrt(some.mean(axis=0))
@@ -141,12 +135,8 @@ def compared(
     """Return images with and without a feature; the feature None switches off nothing.
 
     Args:
-        case: the case.
-        on: its model with every feature, whose kernels are compiled. Features of shading use its
+        on: the model with every feature, whose kernels are compiled. Features of shading use its
             radiance caches.
-        ablation: the feature.
-        truth: the reference.
-        times: whether times are measured.
     """
     off_is = nullcontext if ablation is None else ablation.applied
     new_light = ablation is None or ablation.light or case.draft
@@ -205,13 +195,7 @@ def compared(
 def measure(
     case: Case, only: Sequence[str], times: bool = True
 ) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the results of each ablation of a case; the first is "nothing", with every feature.
-
-    Args:
-        case: the case.
-        only: words; an ablation is measured if its name contains one of them.
-        times: whether times are measured.
-    """
+    """Yield the results of the ablations of a case whose names contain a word, and of "nothing"."""
     truth = reference(case)
     model = case.model()
     contact = case.contact(model)
@@ -242,8 +226,7 @@ def verdict(found: dict[str, Any], what: str) -> str:
 def table(found: dict[str, Any]) -> str:
     """Return the results as Markdown."""
     lines = [
-        "# Ablation of the optics", "",
-        "The command `python -m benchmarks.ablation` writes this page; do not edit it.", "",
+        *page_head("Ablation of the optics", "benchmarks.ablation"),
         "Each acceleration and refinement of the optics is switched off in turn. Images have "
         f"{RESOLUTION[0]}x{RESOLUTION[1]} pixels and {PHOTONS:,} photons, and a ball of radius "
         f"{RADIUS} mm is pressed in by {DEPTH} mm, unless the case says otherwise. The error is "
@@ -300,9 +283,7 @@ def table(found: dict[str, Any]) -> str:
                 seconds = row.get(f"cpu_s_{key}")
                 cells += ["" if seconds is None else f"{seconds:.2f}", changes.get(key, "")]
             lines.append(f"| {what} | " + " | ".join(cells) + " |")
-        about = case["machine"]
-        busy = f"; the machine was busy (load {about['load_at_start']})" if about["busy"] else ""
-        lines += ["", f"{about['date']}, {about['processor']}, {about['cores']} cores{busy}"]
+        lines += ["", measured_on(case["machine"])]
     return "\n".join(lines) + "\n"
 
 
@@ -326,20 +307,18 @@ def main() -> None:
     console = Console()
     about = machine()
     say_if_busy(console, about)
-    path = FOLDER / "ablation.json"
     for case in CASES:
         if not any(word in case.name for word in options.case):
             continue
         for what, row in measure(case, options.only, not options.errors):
             # Read anew: cases may be measured by processes of their own.
-            found = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+            found = stored("ablation")
             known = found.setdefault(case.name, {"machine": about, "rows": {}})
             known["machine"] = about
             known["rows"][what] = row
             console.print(f"{case.name}: {what} " + json.dumps(row), highlight=False)
             if not options.dry:
-                path.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-                (FOLDER / "ablation.md").write_text(table(found), encoding="utf-8")
+                store("ablation", found, table(found))
 
 
 if __name__ == "__main__":

@@ -155,10 +155,6 @@ def smooth(image: FloatArray) -> FloatArray:
 def masks(contact: NDArray[np.bool_], truth: FloatArray) -> list[NDArray[np.bool_]]:
     """Return masks (h, w) of the pixels in the contact, of those around it, and of all others that
     are not dark, of which those around it are a part.
-
-    Args:
-        contact: contact mask (h, w).
-        truth: radiance (h, w, 3) of the reference.
     """
     lit = ~contact & (truth.sum(axis=-1) > 0.02 * truth.sum(axis=-1).mean())
     return [contact, lit & (distance_transform_edt(~contact) <= RING), lit]

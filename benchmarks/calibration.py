@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 import optisense as ots
-from benchmarks.results import measure_parts
+from benchmarks.results import measure_parts, page_head
 from optisense.calibration import PhotographedPress, Photographs, calibrate, photograph_model
 from optisense.calibration._fit_rounds import AGAIN
 from optisense.calibration._fitted_numbers import with_known_total
@@ -158,12 +158,8 @@ def errors_of(
     """Return the errors (n,) of fitted numbers, in standard deviations that the fit states.
 
     Args:
-        design: design that the layers show.
-        chosen: numbers to fit.
         hidden: (n,) hidden steps of the numbers.
-        real: layers of the photographs.
-        layers, noise: layers of the fit, and a sample of their noise.
-        seen: contacts.
+        real, layers, noise: layers of the photographs and of the fit, and a sample of its noise.
     """
     chain = chain_with(real.chain, chosen, hidden)
     factors = power_factors(real.groups, chosen, hidden).astype(np.float32)
@@ -263,8 +259,7 @@ def total_power(design: SensorDesign) -> float:
 def table(found: dict[str, Any]) -> str:
     """Return the results as Markdown."""
     lines = [
-        "# Fits to photographs of simulated sensors", "",
-        "The command `python -m benchmarks.calibration` writes this page; do not edit it.", "",
+        *page_head("Fits to photographs of simulated sensors", "benchmarks.calibration"),
         f"The photographs, a background and {len(PLACES)} presses of a ball of {2 * RADIUS:g} mm, "
         "are simulated with parameters that the fit does not know, and have noise, dust, blur and "
         "inaccurate labels. The fit starts from the built-in sensor, varies the default parameters "

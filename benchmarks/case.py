@@ -53,12 +53,9 @@ class Case:
 def relative_error(
     image: FloatArray, truth: FloatArray, mask: NDArray[np.bool_], truth_noise: float = 0.0
 ) -> float:
-    """Return the RMS difference over pixels and channels, divided by the mean of the reference.
+    """Return the RMS difference of radiances (h, w, 3), divided by the mean of the reference.
 
     Args:
-        image: radiance (h, w, 3).
-        truth: radiance (h, w, 3) of the reference.
-        mask: mask (h, w) of the pixels that are compared.
         truth_noise: the reference's own error in the same measure, which is subtracted in
             quadrature; the result is 0 where it is larger than the difference.
     """

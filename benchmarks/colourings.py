@@ -13,14 +13,13 @@ import os
 import resource
 import time
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from rich.console import Console
 
 import optisense
-from benchmarks.results import machine
+from benchmarks.results import machine, page_head, store, stored
 from optisense.design import SensorDesign, set_value
 from optisense.objectives import Evaluation, Settings
 from optisense.optics import OpticalModel
@@ -30,7 +29,6 @@ from optisense.search.executors import SerialRunner
 from optisense.search.study.loop import StudyRun
 from optisense.search.study.rescoring import fresh_seeds
 
-FOLDER = Path(__file__).parent
 OBJECTIVES = ("rgb2normal", "normdiff")
 COLOURS = {"lights.lg*.colour": ["R", "G", "B"]}
 DRAWN = 5
@@ -102,11 +100,8 @@ def main() -> None:
 
 def write(found: dict[str, Any]) -> None:
     """Store a run beside those with other numbers of photons."""
-    path = FOLDER / "colourings.json"
-    runs = json.loads(path.read_text()) if path.is_file() else {}
-    runs[str(found["photons_an_image"])] = found
-    path.write_text(json.dumps(runs, indent=2) + "\n")
-    (FOLDER / "colourings.md").write_text(markdown(runs))
+    runs = stored("colourings") | {str(found["photons_an_image"]): found}
+    store("colourings", runs, markdown(runs))
 
 
 def letters(trial: Trial) -> str:
@@ -201,10 +196,7 @@ def scores_of(evaluation: Evaluation) -> Scores:
 def markdown(runs: dict[str, Any]) -> str:
     """Return the results of all runs as Markdown."""
     lines = [
-        "# All colourings of GelSight360",
-        "",
-        "The command `python -m benchmarks.colourings` writes this page; do not edit it.",
-        "",
+        *page_head("All colourings of GelSight360", "benchmarks.colourings"),
         "All 3^8 = 6,561 assignments of red, green and blue to the eight light groups are scored",
         "by RGB2Normal and NormDiff, from one rendering of each group. The goal is "
         f"{TARGET_SECONDS:.0f} s",

@@ -10,7 +10,6 @@ import argparse
 import dataclasses
 import json
 from contextlib import suppress
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 import optisense
-from benchmarks.results import machine
+from benchmarks.results import machine, page_head, store, stored
 from optisense.errors import NoDerivativeError
 from optisense.objectives import evaluate
 from optisense.optics import OpticalModel
@@ -40,7 +39,6 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 
-FOLDER = Path(__file__).parent
 SENSORS = ("gelsight-mini-ideal", "gelbelt", "gelsight360", "gelsight-svelte")
 OBJECTIVES = ("aoap", "2to3pw")
 DIRECTIONS = 10
@@ -77,16 +75,13 @@ def main() -> None:
     parser.add_argument("--dry", action="store_true", help="print only, write no results")
     options = parser.parse_args()
     console = Console()
-    path = FOLDER / "gradients.json"
-    found = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
-    found["machine"] = machine()
+    found = stored("gradients") | {"machine": machine()}
     for part in (options.sensor,) if options.sensor else (*SENSORS, "search"):
         console.print(f"[dim]{part}")
         found[part] = searches() if part == "search" else sensor(part)
         console.print_json(json.dumps(found[part]))
         if not options.dry:
-            path.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-            (FOLDER / "gradients.md").write_text(_markdown(found), encoding="utf-8")
+            store("gradients", found, _markdown(found))
 
 
 def sensor(name: str) -> dict[str, Any]:
@@ -152,11 +147,7 @@ class _Shifted(OpticalModel):
 
 @dataclasses.dataclass(frozen=True)
 class _ShiftedCamera(RayCamera):
-    """Camera whose rays are shifted.
-
-    Attributes:
-        shift: shift of the rays to the right and down, pixels.
-    """
+    """Camera whose rays are shifted to the right and down, in pixels."""
 
     shift: tuple[float, float] = (0.0, 0.0)
 
@@ -172,8 +163,6 @@ def _compared(
     """Return the gradient that the method uses at the start, beside the true differences.
 
     Args:
-        space: search space.
-        objective: name of the objective.
         ways: unit vectors (parameters,) of the directions, in shares of the ranges.
         differences: central differences (directions, steps) of the true score.
     """
@@ -222,10 +211,7 @@ def searches() -> dict[str, Any]:
 def _markdown(found: dict[str, Any]) -> str:
     about = found["machine"]
     lines = [
-        "# Derivatives of chief-ray scores",
-        "",
-        "The command `python -m benchmarks.gradients` writes this page; do not edit it.",
-        "",
+        *page_head("Derivatives of chief-ray scores", "benchmarks.gradients"),
         "The derivatives at the built-in design are compared with central differences of the score "
         f"along {DIRECTIONS} random directions. The parameters are the camera's position (± 1 mm), "
         "rotation and field of view (± 3 degrees), and all points of the sensor's cage if it has "

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import splu
 
+from benchmarks.results import page_head
 from optisense.mechanics import Elasticity
 from optisense.mechanics._convolution import GridResponse
 from optisense.mechanics._normal_contact import contact_area, solve_normal_contact
@@ -183,11 +184,7 @@ class Layer:
         return force, stiff + (bulk / total)[:, None, None] * spread[:, :, None] * spread[:, None]
 
     def press(self, depth: float) -> Press:
-        """Push the ball from its current depth to another one (mm), by damped Newton steps.
-
-        Raises:
-            RuntimeError: Newton's method does not converge.
-        """
+        """Push the ball to a depth (mm) by damped Newton steps, or raise RuntimeError."""
         state = self._state(depth)
         for _ in range(MOST_ITERATIONS):
             off = state.residual[self.free]
@@ -245,11 +242,7 @@ class Layer:
         return State(residual, matrix, entered, float((push * -out[:, 1]).sum()))
 
     def _rim(self, entered: FloatArray) -> float:
-        """Return the radius (mm) of the contact, where the squared pressure extrapolates to 0.
-
-        Args:
-            entered: depth (skin nodes,) of the nodes inside the ball, mm.
-        """
+        """Return the radius (mm) of the contact, where the squared pressure extrapolates to 0."""
         at = (self.nodes + self.moved)[self.skin, 0]
         last = int(np.flatnonzero(entered > 0.0).max())
         square = entered**2
@@ -291,10 +284,10 @@ def main() -> None:
         "contact radius, neo-Hookean (mm) | linear (mm) | difference"
     )
     text = [
-        "# Large indentations: the linear elastic layer compared with a neo-Hookean one",
-        "",
-        "The command `python -m benchmarks.large_strains` writes this page; do not edit it.",
-        "",
+        *page_head(
+            "Large indentations: the linear elastic layer compared with a neo-Hookean one",
+            "benchmarks.large_strains",
+        ),
         f"A ball of radius {RADIUS:g} mm is pressed without friction into a bonded layer with a "
         f"thickness of {THICKNESS:g} mm, E = {GEL.youngs_modulus:g} MPa and a Poisson ratio of "
         f"{GEL.poisson_ratio:g}. The neo-Hookean model has {ACROSS} x {DOWN} elements.",

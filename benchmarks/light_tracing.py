@@ -119,11 +119,9 @@ def light_traced(
     """Return a function that renders the picture (h, w, 3) of a region with a given seed.
 
     Args:
-        model: sensor without contacts.
-        scene: its surfaces with contacts.
+        scene: the surfaces with contacts.
         camera: the camera, of the region's pixels alone.
-        photons: number of photons of a pass.
-        passes: number of passes of a picture.
+        photons: number of photons of each of the passes of a picture.
 
     Raises:
         RenderError: the camera does not see the region through smooth interfaces.

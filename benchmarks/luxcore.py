@@ -65,12 +65,9 @@ nearly all light passes through the gel.
 
 
 def render_luxcore(scene: dict[str, Any], engine: str, budget: float) -> list[Snapshot]:
-    """Return images after the whole budget (seconds) and after halves of it.
+    """Return images of a `plain_scene` after the whole budget (s) and after halves of it.
 
-    Args:
-        scene: see ``plain_scene``.
-        engine: one of ENGINES.
-        budget: seconds of rendering; LuxCore's photon caches count, its scene set-up does not.
+    LuxCore's photon caches count, its scene set-up does not.
 
     Raises:
         RuntimeError: LuxCore is not installed, or failed.

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from benchmarks.patch_references import Referee, Reference, ray_offset_shift
-from benchmarks.results import measure_parts
+from benchmarks.results import measure_parts, page_head
 from optisense import OpticalModel, sensors
 from optisense.design import SensorDesign, set_value
 from optisense.geometry import Contact, Sphere
@@ -193,12 +193,10 @@ def compare(
         scale: radiance (3,) by which the differences of each channel are divided.
 
     Returns:
-        rms: RMS error of the mean of the images over all patches and channels, with the noise of
-        both subtracted in quadrature. limit: upper limit of this error, two standard errors of its
-        square above it. worst: error of the worst patch. noise: RMS noise of the reference.
-        image_noise: RMS noise of the mean of the images. red, green, blue: relative error of the
-        mean over all patches. red_noise, green_noise, blue_noise: standard error of this error,
-        from the noise of both.
+        rms, limit: RMS error of the mean of the images over all patches and channels, without the
+            noise of both, and its upper limit. worst: error of the worst patch. noise, image_noise:
+            RMS noise of the reference and of the mean of the images. red, green, blue and
+            red_noise, ...: relative error of the mean over all patches, and its standard error.
     """
     (whole, noise), (mean, image_noise) = (
         _mean_and_variance(np.array([means(picture, patch) for picture in pictures]) / scale)
@@ -287,8 +285,7 @@ def main() -> None:
 def table(found: dict[str, Any]) -> str:
     """Return the results as Markdown."""
     lines = [
-        "# Errors of the rendered light by regions of a contact", "",
-        "The command `python -m benchmarks.patches` writes this page; do not edit it.", "",
+        *page_head("Errors of the rendered light by regions of a contact", "benchmarks.patches"),
         f"A ball of radius {RADIUS} mm is pressed in. The mean of several images of "
         f"{RESOLUTION[0]}x{RESOLUTION[1]} pixels or more and {PHOTONS / 1e6:g} million photons is "
         "compared with a reference, in absolute units: Mitsuba's `path`, or light tracing "

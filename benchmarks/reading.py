@@ -10,22 +10,19 @@ random places, a network, three other shapes to reconstruct, an elastic skin.
 from __future__ import annotations
 
 import argparse
-import json
 import time
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from rich.console import Console
 from scipy.stats import spearmanr
 
-from benchmarks.results import machine, say_if_busy
+from benchmarks.results import FOLDER, machine, page_head, say_if_busy, store, stored
 from optisense import OpticalModel, evaluate, sensors
 from optisense.design import SensorDesign, set_value
 from optisense.objectives import Evaluation, Settings
 from optisense.tasks import ReconstructionSettings, reconstruct
 
-FOLDER = Path(__file__).parent
 SENSORS = (
     "gelsight-mini-ideal",
     "gelsight-mini-ideal-cylindrical",
@@ -57,9 +54,8 @@ def main() -> None:
     about = machine()
     say_if_busy(console, about)
     content: dict[str, Any] = {"machine": about, "rows": []}
-    file = FOLDER / "reading.json"
-    if file.exists() and not options.again:
-        content["rows"] = json.loads(file.read_text(encoding="utf-8"))["rows"]
+    if not options.again:
+        content["rows"] = stored("reading").get("rows", [])
     for name in options.sensor:
         model: OpticalModel | None = None
         for specularity in options.specularity:
@@ -73,8 +69,7 @@ def main() -> None:
             row = {"sensor": name, "specularity": specularity} | _measure(model, design, options)
             console.print(row)
             content["rows"] = sorted([*content["rows"], row], key=_order)
-            file.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-            (FOLDER / "reading.md").write_text(_page(content), encoding="utf-8")
+            store("reading", content, _page(content))
     (FOLDER / "reading.md").write_text(_page(content), encoding="utf-8")
 
 
@@ -120,10 +115,7 @@ def agreement(rows: list[dict[str, Any]], score: str) -> tuple[float, int]:
 def _page(content: dict[str, Any]) -> str:
     rows = content["rows"]
     lines = [
-        "# Scores compared with the reconstruction task",
-        "",
-        "The command `python -m benchmarks.reading` writes this page; do not edit it.",
-        "",
+        *page_head("Scores compared with the reconstruction task", "benchmarks.reading"),
         "Errors of normals are in degrees. `reading` is the median over places, and the next",
         "column is the mean over places. Higher values of RGB2Normal and NormDiff are better. The",
         f"images are {WIDE} pixels wide for the scores ({2 * WIDE} for",

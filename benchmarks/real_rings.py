@@ -38,14 +38,8 @@ Picture = NDArray[np.uint8]
 
 
 def ring_share(picture: Picture, background: Picture) -> tuple[float, float]:
-    """Return the mean difference in the ring over that in the contact, and the contact's radius.
-
-    Args:
-        picture: picture (h, w, 3) of a press, 8 bits.
-        background: picture (h, w, 3) without contact, 8 bits.
-
-    Returns:
-        Ratio, and radius in pixels.
+    """Return the mean difference in the ring over that in the contact, and its radius (pixels), of
+    pictures (h, w, 3) of 8 bits.
 
     Raises:
         ValueError: no contact is found.
@@ -62,13 +56,7 @@ def ring_share(picture: Picture, background: Picture) -> tuple[float, float]:
 
 
 def depth_of(model: ots.OpticalModel, ball: float, radius: float, skin: str) -> float:
-    """Return the depth (mm) at which a ball touches a disc of a given radius.
-
-    Args:
-        model: sensor.
-        ball: radius of the ball, mm.
-        radius: radius of the disc, mm.
-        skin: model of the skin.
+    """Return the depth (mm) at which a ball touches a disc of a given radius (mm).
 
     Raises:
         ValueError: no depth up to `DEEPEST` gives that radius.

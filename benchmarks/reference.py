@@ -89,14 +89,7 @@ def make_reference(
     photons: int = PHOTONS,
     tell: Callable[[str], None] = print,
 ) -> Reference:
-    """Return the reference, from the cache if it was rendered before with these settings.
-
-    Args:
-        case: case.
-        seeds: number of independent images.
-        photons: number of photons of each.
-        tell: function that is called with a line of text after each image.
-    """
+    """Return the reference, from the cache if it was rendered before with these settings."""
     radius = FIRST_RADIUS
     key = _key(case.model.design, seeds, photons, radius)
     path = CACHE / f"reference-{key}.npz"

@@ -36,16 +36,9 @@ def compare_renderers(
 
     Each image is scaled to the reference's mean inside the contact before its error is measured, so
     that another unit of radiance does not count as an error; the scale is reported. A renderer that
-    does not reach the target in time gets the time of its last image times (error / target)^2.
-    Monte Carlo noise falls at this rate and bias does not, so this favours the other renderers.
-
-    Args:
-        case: case.
-        reference: converged image.
-        target_error: relative RMS error of our image.
-        our_seconds: time of our image, s.
-        budget: rendering time of each renderer, s.
-        tell: function that is called with a line of text before each renderer.
+    does not reach the target in its budget (s) gets the time of its last image times (error /
+    target)^2. Monte Carlo noise falls at this rate and bias does not, so this favours the other
+    renderers.
     """
     ours = case.model.render([ball()], resolution=RESOLUTION, skin=CONFORMING).radiance
     rows: list[dict[str, Any]] = []

@@ -48,13 +48,8 @@ def measure_parts(
     measures: Mapping[str, Callable[[], Mapping[str, Any]]],
     table: Callable[[dict[str, Any]], str],
 ) -> None:
-    """Run the command line of a benchmark of several parts: measure, print and write.
-
-    Args:
-        name: name of its files, NAME.json and NAME.md, in this folder.
-        about: description in the help text.
-        measures: function that measures each part.
-        table: function that returns the results of all parts as Markdown.
+    """Run the command line of a benchmark of several parts: measure, print and write NAME.json, and
+    NAME.md by ``table``.
     """
     parser = argparse.ArgumentParser(description=about)
     parser.add_argument("--only", choices=measures, help="measure one part only")
@@ -63,17 +58,43 @@ def measure_parts(
     console = Console()
     here = machine()
     say_if_busy(console, here)
-    path = FOLDER / f"{name}.json"
     for part in (options.only,) if options.only else measures:
         console.print(f"[dim]{part}")
         row = {"machine": here, **measures[part]()}
         console.print_json(json.dumps(row))
         # Read now, since another process may have measured another part meanwhile.
-        found = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
-        found[part] = row
+        found = stored(name) | {part: row}
         if not options.dry:
-            path.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-            path.with_suffix(".md").write_text(table(found), encoding="utf-8")
+            store(name, found, table(found))
+
+
+def stored(name: str) -> dict[str, Any]:
+    """Return the results in NAME.json; empty if there are none."""
+    path = FOLDER / f"{name}.json"
+    return dict(json.loads(path.read_text(encoding="utf-8"))) if path.is_file() else {}
+
+
+def store(name: str, found: dict[str, Any], page: str) -> None:
+    """Write results to NAME.json and their page to NAME.md."""
+    text = json.dumps(found, indent=1) + "\n"
+    (FOLDER / f"{name}.json").write_text(text, encoding="utf-8")
+    (FOLDER / f"{name}.md").write_text(page, encoding="utf-8")
+
+
+def page_head(title: str, command: str) -> list[str]:
+    """Return the first lines of a page that ``python -m COMMAND`` writes."""
+    about = f"The command `python -m {command}` writes this page; do not edit it."
+    return [f"# {title}", "", about, ""]
+
+
+def measured_on(about: Mapping[str, Any]) -> str:
+    """Return the date and the machine of a measurement in words."""
+    return f"{about['date']}, {about['processor']}, {about['cores']} cores{busy_note(about)}"
+
+
+def busy_note(about: Mapping[str, Any]) -> str:
+    """Return words that a machine, as of `machine`, was busy; none if it was not."""
+    return f"; the machine was busy (load {about['load_at_start']})" if about["busy"] else ""
 
 
 def say_if_busy(console: Console, about: Mapping[str, Any]) -> None:
@@ -209,10 +230,7 @@ def _renderer_table(comparison: dict[str, Any]) -> _TableData:
 
 def _markdown(results: dict[str, Any]) -> str:
     lines = [
-        "# Speed and accuracy",
-        "",
-        "The command `python -m benchmarks` writes this page; do not edit it.",
-        "",
+        *page_head("Speed and accuracy", "benchmarks"),
     ]
     for part in ("reference", "speed", "renderers"):
         if part in results:
@@ -241,8 +259,7 @@ def _markdown(results: dict[str, Any]) -> str:
 
 def _about(machine: dict[str, Any]) -> str:
     versions = ", ".join(f"{name} {value}" for name, value in machine["versions"].items())
-    busy = f"; the machine was busy (load {machine['load_at_start']})" if machine["busy"] else ""
     return (
         f"{machine['date']}, {machine['processor']}, {machine['cores']} cores, "
-        f"{machine['system']}, Python {machine['python']}, {versions}{busy}"
+        f"{machine['system']}, Python {machine['python']}, {versions}{busy_note(machine)}"
     )

@@ -7,10 +7,8 @@ file. The sensor is GelSight Mini with its flat gel, at the default settings of 
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
 from statistics import mean, stdev
 from typing import Any
 
@@ -19,7 +17,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 import optisense
-from benchmarks.results import machine
+from benchmarks.results import busy_note, machine, page_head, store
 from benchmarks.timing import Time, medians, timed
 from optisense import library
 from optisense.objectives import Evaluation, Press, Score, Settings, evaluate, find
@@ -28,7 +26,6 @@ from optisense.objectives.rgb2normal import fit, line, signed_angles
 from optisense.objectives.scoring import run_objective
 from optisense.optics import OpticalModel
 
-FOLDER = Path(__file__).parent
 DESIGN = "gelsight-mini-ideal"
 SEEDS = 20
 """Number of seeds; 20 give a standard deviation to a sixth of its value."""
@@ -101,8 +98,7 @@ def main() -> None:
     text = _markdown(found)
     console.print(text, markup=False)
     if not options.dry:
-        (FOLDER / "scores.json").write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
-        (FOLDER / "scores.md").write_text(text, encoding="utf-8")
+        store("scores", found, text)
 
 
 def measure_seeds(
@@ -320,14 +316,11 @@ def _seconds(time: Time) -> dict[str, float]:
 
 def _markdown(found: dict[str, Any]) -> str:
     about = found["machine"]
-    busy = f"; the machine was busy (load {about['load_at_start']})" if about["busy"] else ""
     lines = [
-        "# Scatter, bias and time of scores",
-        "",
-        "The command `python -m benchmarks.scores` writes this page; do not edit it.",
-        "",
+        *page_head("Scatter, bias and time of scores", "benchmarks.scores"),
         f"The sensor is {found['design']}, with default settings. Measured on {about['date']}: "
-        f"{about['processor']}, {about['cores']} cores, Python {about['python']}{busy}.",
+        f"{about['processor']}, {about['cores']} cores, Python {about['python']}"
+        f"{busy_note(about)}.",
         "",
         "| score | value | standard deviation over seeds | seconds | CPU seconds | target |",
         "|---|---|---|---|---|---|",

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.results import measure_parts
+from benchmarks.results import measure_parts, measured_on, page_head
 from benchmarks.timing import Time, medians, run_child, timed
 from optisense import OpticalModel, sensors
 from optisense.geometry import Contact, Sphere
@@ -86,12 +86,10 @@ def measure(name: str) -> dict[str, Any]:
 
 
 def least_photons(model: OpticalModel, ball: Contact) -> tuple[int, float]:
-    """Return the smallest number of photons that reaches `WANTED_NOISE`, within some 15 %.
+    """Return the smallest number of photons that reaches `WANTED_NOISE`, within some 15 %, and the
+    relative noise in the contact.
 
     The next number of photons is predicted from noise that falls as their cubic root.
-
-    Returns:
-        Number of photons, and relative noise in the contact.
     """
     photons, too_few = TRIAL_PHOTONS, 0
     while True:
@@ -130,8 +128,7 @@ def table(found: dict[str, Any]) -> str:
             "noise in the contact", "image, new photons", "image, light kept",
             "first image in a new process")  # fmt: skip
     lines = [
-        "# Times of the built-in sensors", "",
-        "The command `python -m benchmarks.sensors` writes this page; do not edit it.", "",
+        *page_head("Times of the built-in sensors", "benchmarks.sensors"),
         "Times are medians in seconds; the processor time of all threads is in brackets. A ball of "
         f"radius {RADIUS} mm is pressed {DEPTH} mm deep into the middle of the view, at "
         f"{RESOLUTION[0]}x{RESOLUTION[1]} pixels. The number of photons is that which reduces the "
@@ -154,11 +151,7 @@ def table(found: dict[str, Any]) -> str:
         lines.append("| " + " | ".join(cells) + " |")
     lines.append("")
     for name, row in found.items():
-        about = row["machine"]
-        busy = f"; the machine was busy (load {about['load_at_start']})" if about["busy"] else ""
-        lines.append(
-            f"- {name}: {about['date']}, {about['processor']}, {about['cores']} cores{busy}"
-        )
+        lines.append(f"- {name}: {measured_on(row['machine'])}")
     return "\n".join(lines) + "\n"
 
 

@@ -38,13 +38,7 @@ def cases(model: ots.OpticalModel) -> dict[str, list[Contact]]:
 
 
 def times(model: ots.OpticalModel, contacts: list[Contact], kept: bool) -> dict[str, Time]:
-    """Return the median time of a picture of each skin.
-
-    Args:
-        model: sensor.
-        contacts: contacts of the first picture.
-        kept: whether all pictures share the photons of the first one.
-    """
+    """Return the median time of a picture of each skin, with ``kept`` photons or new ones."""
     found: dict[str, list[Time]] = {skin: [] for skin in SKINS}
     seed = 0
     for run in range(-1, RUNS):  # the first compiles kernels and does not count

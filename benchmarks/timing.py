@@ -60,9 +60,6 @@ def run_child(command: list[str]) -> tuple[Time, int]:
     """Run a command in the repository's root, and return its time and peak memory (bytes).
 
     Its Python keeps compiled modules, as an installed package does.
-
-    Raises:
-        RuntimeError: the command fails.
     """
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
     launch = [sys.executable, "-S", "-c", LAUNCHER, *command]
