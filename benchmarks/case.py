@@ -43,11 +43,7 @@ class Case:
     @cached_property
     def mask(self) -> NDArray[np.bool_]:
         """Mask (h, w) of the pixels whose centre sees the ball."""
-        from optisense.optics.scene.surfaces import Region
-
-        rays = self.model.chief_rays(RESOLUTION, [ball()], CONFORMING)
-        seen: NDArray[np.bool_] = rays.hit & (rays.region == Region.INDENTER)
-        return seen
+        return self.model.chief_rays(RESOLUTION, [ball()], CONFORMING).contact_mask
 
 
 def relative_error(

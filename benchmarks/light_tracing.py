@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from optisense import OpticalModel
 from optisense.errors import RenderError
+from optisense.geometry import TriangleMesh
 from optisense.optics.backend.arrays import indices
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging._film import Film
@@ -177,12 +178,8 @@ def _end(scene: RayScene, camera: RayCamera, film: mi.Point2f) -> PathEnd:
 def _guide(model: OpticalModel, points: FloatArray) -> EmissionGuide:
     """Return an emission guide towards points (n, 3), mm, learned without contacts."""
     scenes = model.scenes
-    vertices, faces, start = [], [], 0
-    for piece in scenes.opaque:
-        vertices.append(np.asarray(piece.vertices, dtype=np.float64))
-        faces.append(np.asarray(piece.faces, dtype=np.int64) + start)
-        start += len(piece.vertices)
-    cells = build_cells(np.concatenate(vertices), np.concatenate(faces), PILOT_CELL_SIZE)
+    mesh = TriangleMesh.joined([TriangleMesh(p.vertices, p.faces) for p in scenes.opaque])
+    cells = build_cells(mesh.vertices, mesh.faces, PILOT_CELL_SIZE)
     near = cells_near(cells, points, MARGIN)
     lights = scenes.emitter_table.count
     per_light = max(1, PILOT_PHOTONS // lights)

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import time
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
 from benchmarks.case import RESOLUTION, Case, ball
-from benchmarks.mitsuba_export import mitsuba_scene
+from benchmarks.mitsuba_export import Colour, mitsuba_scene
 from benchmarks.snapshots import Snapshot, due_times
+from optisense import OpticalModel
+from optisense.geometry import Contact
 from optisense.optics.scene import assembly
 from optisense.optics.scene.ray_scene import Piece
 from optisense.optics.scene.surfaces import Region
@@ -21,16 +24,26 @@ DEPTH = 32
 """Largest number of surfaces of a path; longer paths carry less than 0.1 % of the light."""
 
 
-def case_pieces(case: Case) -> tuple[assembly.Assembly, list[Piece]]:
-    """Return the assembly of the sensor, and the pieces of the sensor and the ball."""
-    model = case.model
-    parts = assembly.assemble(model.design)
-    coat = assembly.coating_surface(
-        model.design.coating,
-        parts.ior_before,
-        Region.INDENTER,
-    )
-    return parts, [*parts.pieces, assembly.indenter_piece(model.place(ball()), coat)]
+def pieces_with(
+    model: OpticalModel, contact: Contact
+) -> tuple[assembly.Assembly, list[Piece], list[Colour]]:
+    """Return the assembly of the sensor, the pieces of the sensor and the indenter, and the flux
+    (mW) of each light of a group per channel.
+    """
+    design = model.design
+    parts = assembly.assemble(design)
+    coat = assembly.coating_surface(design.coating, parts.ior_before, Region.INDENTER)
+    pieces = [*parts.pieces, assembly.indenter_piece(model.place(contact), coat)]
+    return parts, pieces, [tuple(design.lights[g].channel_flux().tolist()) for g in parts.groups]
+
+
+def scene_with(
+    model: OpticalModel, contact: Contact, size: tuple[int, int], samples: int, max_depth: int
+) -> dict[str, Any]:
+    """Return the sensor and the indenter for `mi.load_dict`, seen by the sensor's camera."""
+    parts, pieces, flux = pieces_with(model, contact)
+    camera = model.camera(size)
+    return mitsuba_scene(pieces, parts.emitters, camera, flux, samples=samples, max_depth=max_depth)
 
 
 def render_path(case: Case, budget: float) -> list[Snapshot]:
@@ -38,19 +51,7 @@ def render_path(case: Case, budget: float) -> list[Snapshot]:
 
     Kernels are compiled before the time begins.
     """
-    model = case.model
-    parts, pieces = case_pieces(case)
-    flux = [tuple(model.design.lights[name].channel_flux().tolist()) for name in parts.groups]
-    scene = mi.load_dict(
-        mitsuba_scene(
-            pieces,
-            parts.emitters,
-            model.camera(RESOLUTION),
-            flux,
-            samples=PASS_SAMPLES,
-            max_depth=DEPTH,
-        )
-    )
+    scene = mi.load_dict(scene_with(case.model, ball(), RESOLUTION, PASS_SAMPLES, DEPTH))
     width, height = RESOLUTION
     total = np.zeros((height, width, 3))
     np.asarray(mi.render(scene, spp=PASS_SAMPLES, seed=0))

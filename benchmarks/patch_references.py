@@ -24,13 +24,13 @@ from numpy.typing import NDArray
 
 from benchmarks.light_tracing import light_traced
 from benchmarks.mitsuba_export import mitsuba_scene
+from benchmarks.mitsuba_path import scene_with
 from benchmarks.reference import window_camera
 from optisense import OpticalModel
 from optisense.design import SensorDesign
 from optisense.geometry import Contact
 from optisense.optics.imaging._film import box_around
 from optisense.optics.scene import assembly
-from optisense.optics.scene.surfaces import Region
 
 FloatArray = NDArray[np.floating]
 Window = tuple[slice, slice]
@@ -152,19 +152,9 @@ class Reference:
         return found, len(paths) * effort.count(self.referee)
 
     def _path(self, effort: Effort) -> Render:
-        model, (rows, columns) = self.model, self.window
-        parts = assembly.assemble(model.design)
-        coat = assembly.coating_surface(model.design.coating, parts.ior_before, Region.INDENTER)
-        pieces = [*parts.pieces, assembly.indenter_piece(model.place(self.contact), coat)]
-        flux = [tuple(model.design.lights[name].channel_flux().tolist()) for name in parts.groups]
-        scene = mitsuba_scene(
-            pieces,
-            parts.emitters,
-            model.camera(self.mask.shape[::-1]),
-            flux,
-            samples=PASS_SAMPLES,
-            max_depth=PATH_DEPTH,
-        )
+        rows, columns = self.window
+        height, width = self.mask.shape
+        scene = scene_with(self.model, self.contact, (width, height), PASS_SAMPLES, PATH_DEPTH)
         scene["sensor"]["film"] |= {
             "crop_offset_x": int(columns.start),
             "crop_offset_y": int(rows.start),

@@ -12,7 +12,7 @@ import numpy as np
 
 from benchmarks import luxcore
 from benchmarks.case import RESOLUTION, Case, FloatArray, ball, relative_error
-from benchmarks.mitsuba_path import case_pieces, render_path
+from benchmarks.mitsuba_path import pieces_with, render_path
 from benchmarks.reference import CACHE, Reference
 from benchmarks.snapshots import Snapshot
 from optisense.design.colour import encode
@@ -72,8 +72,7 @@ def compare_renderers(
 def _render(case: Case, name: str, budget: float) -> list[Snapshot]:
     if name == MITSUBA:
         return render_path(case, budget)
-    parts, pieces = case_pieces(case)
-    flux = [case.model.design.lights[group].channel_flux() for group in parts.groups]
+    parts, pieces, flux = pieces_with(case.model, ball())
     camera = case.model.camera(RESOLUTION)
     scene = luxcore.plain_scene(pieces, parts.emitters, camera, flux)
     return luxcore.render_luxcore(scene, name, budget)

@@ -38,7 +38,6 @@ from optisense.optics.radiance_cache.tracing_limits import TracingLimits
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.sensor_scenes import SensorScenes
 from optisense.optics.scene.surface_cells import fineness
-from optisense.optics.scene.surfaces import Region
 from optisense.optics.transport.chief_rays import ChiefRays, sees_nothing, trace_chief_rays
 from optisense.optics.transport.emission_guide import EmissionGuide
 from optisense.optics.transport.photons import Emission
@@ -312,7 +311,7 @@ class OpticalModel(RayModel):
             },
             unit_layers=units,
             normals=normals,
-            contact_mask=hit & (view.rays.region == Region.INDENTER),
+            contact_mask=view.rays.contact_mask,
             points=points,
             interrupted=layers.interrupted,
             chain=self.picture_chain,

@@ -98,14 +98,12 @@ class Misalignment:
             ContactError: the plane would pass through the gel.
             TaskError: the plane would not cover the crop.
         """
-        from optisense.optics.scene.surfaces import Region
-
         size = model.design.camera.size_at(RAYS_ACROSS)
         for angle_x in (-self.range, self.range):
             for angle_y in (-self.range, self.range):
                 contact = plane_contact(model, angle_x, angle_y, self.depth)
                 rays = model.chief_rays(size, [contact], CONFORMING)
-                self._ensure_covered(rays.hit & (rays.region == Region.INDENTER))
+                self._ensure_covered(rays.contact_mask)
 
     def contact(
         self, model: OpticalModel, rng: np.random.Generator
