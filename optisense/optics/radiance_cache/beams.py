@@ -15,7 +15,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.optics.backend.arrays import floats, indices
+from optisense.optics.backend.arrays import indices
 from optisense.optics.radiance_cache._direction_bins import FINE_BINS, Tables
 from optisense.optics.radiance_cache.angular_variance import angular_variance, passes_near
 from optisense.optics.scene.surface_cells import SurfaceCells, bin_axis
@@ -231,14 +231,11 @@ def cull_beams(beams: Beams, cells: SurfaceCells, groups: int, balls: mi.Float) 
         balls: (4 k,) centre and radius of each ball, four floats, mm.
     """
     entries = cells.cells * groups
-    centres = np.zeros((cells.cells, 4), dtype=np.float32)
-    centres[:, :3] = cells.centres
-    middles = floats(centres)
     lane = dr.arange(mi.UInt32, entries)
     near = dr.zeros(mi.UInt32, dr.width(beams.ways) // 4)
     margin = READ_DISTANCE / cells.inverse_size
     place = Neighbourhood(
-        middles, balls, dr.opaque(mi.UInt32, dr.width(balls) // 4), margin, bin_axis(cells, 2)
+        cells.middles, balls, dr.opaque(mi.UInt32, dr.width(balls) // 4), margin, bin_axis(cells, 2)
     )
     count = _mark_near(beams, place, dr.opaque(mi.UInt32, groups), lane, near)
     counts = dr.zeros(mi.UInt32, entries + 1)

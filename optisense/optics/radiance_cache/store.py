@@ -37,7 +37,6 @@ from optisense.optics.transport.photons import (
     trace_photons,
     trace_pilot,
 )
-from optisense.optics.transport.volume_flux import FluxLayer, flux_layer_above
 
 PILOT_PHOTONS = 300_000
 """Number of photons of the pilot pass, from which the emission guide is learned: enough for the
@@ -117,7 +116,6 @@ class CacheStore:
         self._seen = seen
         self._guide: EmissionGuide | None = None
         self._pilot: PilotPhotons | None = None
-        self._above: FluxLayer | None = None
         self._cells: SurfaceCells | None = None
         self._kernels: Kernels | None = None
         self._running: dict[_Traced, CacheTally] = {}
@@ -133,7 +131,7 @@ class CacheStore:
         other._lit = lit
         other._running, other._done = {}, {}
         if lit.coloured != self._lit.coloured or other._directions != self._directions:
-            other._cells = other._above = other._kernels = None
+            other._cells = other._kernels = None
         return other
 
     @property
@@ -169,13 +167,9 @@ class CacheStore:
         return 2 if not self._curved or density >= DENSE else 1
 
     @property
-    def _flux_layer(self) -> FluxLayer | None:
-        """The flux layer, where much of the light is grazing, else None."""
-        if not self._grazes:
-            return None
-        if self._above is None:
-            self._above = flux_layer_above(self.cells)
-        return self._above
+    def _flux_cells(self) -> SurfaceCells | None:
+        """The cells of the flux layer, where much of the light is grazing, else None."""
+        return self.cells if self._grazes else None
 
     @cached_property
     def _fineness(self) -> float:
@@ -356,7 +350,7 @@ class CacheStore:
                 self._lit.table.groups,
                 self._lit.coloured,
                 self._lit.roughness,
-                self._flux_layer,
+                self._flux_cells,
                 self._directions,
                 planes,
                 self._curved,
@@ -391,7 +385,7 @@ class CacheStore:
                         groups=self.groups,
                     ),
                     coloured=self._lit.coloured,
-                    flux_layer=self._flux_layer,
+                    flux_cells=self._flux_cells,
                 )
             )
             took = time.perf_counter() - started

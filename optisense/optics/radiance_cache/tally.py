@@ -30,9 +30,9 @@ from optisense.optics.radiance_cache._raised_plane import areas, crossings
 from optisense.optics.radiance_cache.beams import collect_beams
 from optisense.optics.radiance_cache.cache import BinnedLight, RadianceCache
 from optisense.optics.radiance_cache.smoothing import Kernels, Smoothing, product
-from optisense.optics.scene.surface_cells import bin_axis, cell_at
+from optisense.optics.scene.surface_cells import SurfaceCells, bin_axis, cell_at
 from optisense.optics.transport.photon_map import GROUP_MASK, HALF_SHIFT, PhotonMap
-from optisense.optics.transport.volume_flux import FluxLayer, layer_cell_at
+from optisense.optics.transport.volume_flux import layer_cell_at
 
 MIN_COSINE = 0.02
 """Lower bound on the cosine of incidence (89 degrees) that a photon's power is divided by, so that
@@ -66,7 +66,7 @@ class CacheTally:
         groups: int,
         coloured: bool,
         roughness: float | None,
-        flux_layer: FluxLayer | None = None,
+        flux_cells: SurfaceCells | None = None,
         directions: DirectionBins = COARSE_BINS,
         planes: int = 1,
         curved: bool = False,
@@ -77,15 +77,15 @@ class CacheTally:
             groups: number of light groups.
             coloured: whether powers are kept per colour channel.
             roughness: GGX alpha of the sharpest metallic lobe of a coating; None without metal.
-            flux_layer: the layer in which the light above the surface is tallied; None for no
-                layer.
+            flux_cells: cells of the flux layer, in which light above the surface is tallied; None
+                for none.
             planes: 2 to tally the light in the raised plane as well (see `raised_plane`), else 1.
             curved: whether surfaces are curved.
         """
         self.directions = directions
         self.planes = planes
         self.raised_areas = areas(kernels.cells) if planes > 1 and curved else None
-        self.flux_layer = flux_layer
+        self.flux_cells = flux_cells
         self.roughness = roughness
         self.kernels = kernels
         self.cells = cells = kernels.cells
@@ -95,7 +95,7 @@ class CacheTally:
         self.photons = 0
         entries = planes * cells.cells * directions.count * groups * 4
         self.landed = self._tables(entries)
-        self.above_surface = None if flux_layer is None else self._tables(entries)
+        self.above_surface = None if flux_cells is None else self._tables(entries)
         # Power of the photons of even and of odd number in each plane; their difference gives the
         # noise. A cell receives more photons than single precision adds exactly.
         self.halves = dr.zeros(mi.Float64, planes * 2 * cells.cells * groups)
@@ -109,23 +109,23 @@ class CacheTally:
         """Add the photons of a pass. All passes must have the same number of photons."""
         self._tally(photons, self.landed, None)
         if self.above_surface is not None and photons.passing is not None:
-            self._tally(photons.passing, self.above_surface, self.flux_layer)
+            self._tally(photons.passing, self.above_surface, self.flux_cells)
         self.passes += 1
         self.photons += photons.emitted
         dr.eval(self.landed, self.halves, self.above_surface)
 
-    def _tally(self, photons: PhotonMap, tables: Tables, flux_layer: FluxLayer | None) -> None:
+    def _tally(self, photons: PhotonMap, tables: Tables, flux_cells: SurfaceCells | None) -> None:
         """Add photons that landed, or that crossed a flux layer, to tables."""
         index = dr.arange(mi.UInt32, photons.count)
         place = dr.gather(mi.Vector4f, photons.place, index)
         travel = dr.gather(mi.Vector4f, photons.travel, index)
         bits = dr.reinterpret_array(mi.UInt32, place.w)
         point = mi.Point3f(place.x, place.y, place.z)
-        if flux_layer is None:
+        if flux_cells is None:
             cell, found = cell_at(self.cells, point, mi.Bool(True))
             across = dr.rcp(dr.maximum(travel.w, MIN_COSINE))
         else:
-            cell, _, found = layer_cell_at(flux_layer, point, mi.Bool(True))
+            cell, _, found = layer_cell_at(flux_cells, point, mi.Bool(True))
             across = dr.rcp(dr.maximum(travel.w, 1e-6))
         direction = mi.Vector3f(travel.x, travel.y, travel.z)
         count = dr.opaque(mi.UInt32, self.directions.count)
@@ -162,7 +162,7 @@ class CacheTally:
             dr.scatter_add(
                 tables.heights, in_quanta(dr.square(height) * flux * relative), entry, counts
             )
-        if flux_layer is not None:
+        if flux_cells is not None:
             return
         half = (bits >> HALF_SHIFT) & 1
         for plane, (row, relative, counts) in enumerate(rows):

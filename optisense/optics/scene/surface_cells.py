@@ -54,7 +54,8 @@ class SurfaceCells:
         creased: whether any place has two cells.
         cells: number of cells.
         planes: normal and offset of the plane of each cell, four floats.
-        centres: (cells, 3) centre of the surface in each cell, mm.
+        middles: centre of the surface in each cell, mm, four floats.
+        centres: (cells, 3) the same centres.
         normals: (cells, 3) mean unit normal of the surface in each cell.
         areas: (cells,) area of the surface in each cell, mm^2.
         offset_growth: (cells, 2) coefficients a (1/mm) and b (1/mm^2) of the area of an offset
@@ -74,6 +75,7 @@ class SurfaceCells:
     creased: bool
     cells: int
     planes: mi.Float
+    middles: mi.Float
     centres: FloatingArray
     normals: FloatingArray
     areas: FloatingArray
@@ -167,6 +169,7 @@ def build_cells(
         creased=cells > len(used),
         cells=cells,
         planes=floats(four),
+        middles=floats(np.pad(centre.astype(np.float32), ((0, 0), (0, 1)))),
         centres=centre,
         normals=normal,
         areas=area,

@@ -35,7 +35,7 @@ from optisense.optics.transport.photon_map import (
     PhotonMap,
     Records,
 )
-from optisense.optics.transport.volume_flux import SAMPLES_PER_SEGMENT, FluxLayer, sample_segment
+from optisense.optics.transport.volume_flux import SAMPLES_PER_SEGMENT, sample_segment
 
 LANDINGS_PER_PHOTON = 1.5
 """Number of landings per photon for which memory is reserved at first. GelSight Mini, DIGIT,
@@ -122,7 +122,7 @@ class _Recording:
 
     landings: Records
     target: TargetCells | None
-    flux_layer: FluxLayer | None
+    flux_cells: SurfaceCells | None
     crossings: Records
 
 
@@ -181,8 +181,8 @@ def _fly(scene: RayScene, flight: Flight, recording: _Recording, seed: mi.UInt64
         sample = LobeSample.drawn(rng)
         step = interact(scene, ray, RayKind.PHOTON, sample)
         hit = step.hit
-        if dr.hint(recording.flux_layer is not None, mode="scalar"):
-            assert recording.flux_layer is not None
+        if dr.hint(recording.flux_cells is not None, mode="scalar"):
+            assert recording.flux_cells is not None
             # Light that leaves the sensing surface and meets no other is handled by
             # interreflection.py. Light from walls, also from their foot, is recorded.
             passes = ray.active & (step.opaque | ~scattered)
@@ -195,7 +195,7 @@ def _fly(scene: RayScene, flight: Flight, recording: _Recording, seed: mi.UInt64
                 exclude=[scene, ray, flight, step, hit, chance, scattered, passes],
             ):
                 spot, share, crosses = sample_segment(
-                    recording.flux_layer, ray, hit, chance, piece, step.opaque, scattered
+                    recording.flux_cells, ray, hit, chance, piece, step.opaque, scattered
                 )
                 if dr.hint(
                     crosses,
@@ -264,31 +264,31 @@ def trace_pilot(
 
 
 def trace_photons(
-    scene: RayScene, emission: Emission, *, coloured: bool, flux_layer: FluxLayer | None = None
+    scene: RayScene, emission: Emission, *, coloured: bool, flux_cells: SurfaceCells | None = None
 ) -> PhotonMap:
     """Emit photons and record where they land.
 
     Args:
-        flux_layer: layer whose crossings are recorded as well; None for no layer.
+        flux_cells: cells of the flux layer whose crossings are recorded as well; None for none.
     """
-    return _traced(scene, emission, None, flux_layer, coloured)[1]
+    return _traced(scene, emission, None, flux_cells, coloured)[1]
 
 
 def _traced(
     scene: RayScene,
     emission: Emission,
     target: TargetCells | None,
-    flux_layer: FluxLayer | None,
+    flux_cells: SurfaceCells | None,
     coloured: bool,
 ) -> tuple[mi.UInt32, PhotonMap]:
     """Trace a pass and collect its landings; a pass whose landings do not fit is repeated."""
     photons = emission.per_light * dr.width(emission.lights)
     room = [int(photons * LANDINGS_PER_PHOTON) + 1024, 0]
-    if flux_layer is not None:
+    if flux_cells is not None:
         room[1] = photons * SAMPLES_PER_SEGMENT + 1024
     while True:
         landings, crossings = (Records.of(each, coloured) for each in room)
-        recording = _Recording(landings, target, flux_layer, crossings)
+        recording = _Recording(landings, target, flux_cells, crossings)
         flight, cell = launch(scene, emission)
         seed = dr.opaque(mi.UInt64, seed_of(emission.seed, emission.first))
         landed = _fly(scene, flight, recording, seed)
@@ -299,5 +299,5 @@ def _traced(
             break
         room = [max(int(1.2 * count), 1024) for count in found]
     of = emission.emitted, 1 / emission.per_light
-    passing = None if flux_layer is None else crossings.photon_map(*of)
+    passing = None if flux_cells is None else crossings.photon_map(*of)
     return cells, landings.photon_map(*of, passing)

@@ -8,13 +8,9 @@ light (a track-length estimator). Each segment of a photon's path is tested at a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import drjit as dr
 import mitsuba as mi
-import numpy as np
 
-from optisense.optics.backend.arrays import floats
 from optisense.optics.scene.ray_scene import Ray, SurfaceHit
 from optisense.optics.scene.surface_cells import SurfaceCells, cell_at, plane_of
 
@@ -37,33 +33,17 @@ MIN_COSINE = 1e-3
 a division by zero, and the part is at most half of the segment in any case."""
 
 
-@dataclass
-class FluxLayer:
-    """The layer above ``cells``; ``centres`` holds the centre (mm) of each cell, four floats."""
-
-    cells: SurfaceCells
-    centres: mi.Float
-
-
-def flux_layer_above(cells: SurfaceCells) -> FluxLayer:
-    """Return the layer above a surface."""
-    four = np.zeros((cells.cells, 4), dtype=np.float32)
-    four[:, :3] = cells.centres
-    return FluxLayer(cells, floats(four))
-
-
 def layer_height(cells: SurfaceCells) -> mi.Float:
     """Return the height (1,), mm, of the layer above cells."""
     return LAYER_HEIGHT * cells.fineness
 
 
 def layer_cell_at(
-    flux_layer: FluxLayer, point: mi.Point3f, active: mi.Bool
+    cells: SurfaceCells, point: mi.Point3f, active: mi.Bool
 ) -> tuple[mi.UInt32, mi.Float, mi.Bool]:
     """Return the number (n,) of the cell that each point lies above, its height (n,), mm, above the
     cell's plane, and whether it is in the layer (n,).
     """
-    cells = flux_layer.cells
     near, found = cell_at(cells, point, active)
     normal, offset = plane_of(cells, near, found)
     foot = point - normal * (dr.dot(normal, point) - offset)
@@ -71,7 +51,7 @@ def layer_cell_at(
     normal, offset = plane_of(cells, cell, found)
     height = dr.dot(normal, point) - offset
     # Beyond the surface's edge the nearest cell is found as well.
-    middle = dr.gather(mi.Vector4f, flux_layer.centres, cell, found)
+    middle = dr.gather(mi.Vector4f, cells.middles, cell, found)
     aside = foot - mi.Point3f(middle.x, middle.y, middle.z)
     size = dr.rcp(cells.inverse_size)
     beside = dr.maximum(dr.maximum(dr.abs(aside.x), dr.abs(aside.y)), dr.abs(aside.z))
@@ -80,7 +60,7 @@ def layer_cell_at(
 
 
 def sample_segment(
-    flux_layer: FluxLayer,
+    cells: SurfaceCells,
     ray: Ray,
     hit: SurfaceHit,
     chance: mi.Float,
@@ -88,7 +68,8 @@ def sample_segment(
     landing: mi.Bool,
     scattered: mi.Bool,
 ) -> tuple[mi.Point3f, mi.Float, mi.Bool]:
-    """Return a random place (3, n) on one of the `SAMPLES_PER_SEGMENT` pieces of a path segment.
+    """Return a random place (3, n) on one of the `SAMPLES_PER_SEGMENT` pieces of a path segment,
+    tested for the layer above cells.
 
     Half of the pieces belong to the segment's end, where the light of a ``landing`` segment is near
     the surface.
@@ -106,14 +87,14 @@ def sample_segment(
     """
     end = dr.select(hit.valid, hit.distance, MAX_SEGMENT_LENGTH)
     cosine = dr.maximum(dr.abs(dr.dot(ray.direction, hit.normal)), MIN_COSINE)
-    top = layer_height(flux_layer.cells)
+    top = layer_height(cells)
     tail = dr.select(landing, dr.minimum(TAIL_HEIGHTS * top / cosine, end * 0.5), end * 0.5)
     last = piece >= SAMPLES_PER_SEGMENT // 2
     length = dr.select(last, tail, end - tail) * (2 / SAMPLES_PER_SEGMENT)
     first = dr.select(last, end - tail, 0) + length * mi.Float(piece % (SAMPLES_PER_SEGMENT // 2))
     place = chance + mi.Float(piece) * GOLDEN_RATIO_FRACTION
     spot = ray.origin + ray.direction * (first + length * (place - dr.floor(place)))
-    cell, _, inside = layer_cell_at(flux_layer, mi.Point3f(spot), mi.Bool(True))
-    upright, _ = plane_of(flux_layer.cells, cell, inside)
+    cell, _, inside = layer_cell_at(cells, mi.Point3f(spot), mi.Bool(True))
+    upright, _ = plane_of(cells, cell, inside)
     inside &= ~scattered | (dr.dot(upright, ray.direction) < 0)
     return mi.Point3f(spot), top / length, inside
