@@ -39,7 +39,7 @@ from optisense.search.space.parameters import (
     Together,
     within,
 )
-from optisense.search.space.rigid_moves import GroupAim, GroupMoves, GroupShift, GroupTurn
+from optisense.search.space.rigid_moves import GroupMoves, GroupTurn, LightShift, LightTurn
 
 RGB_FIELDS = (
     "colour", "reflectance", "eta", "k", "dispersion", "absorption", "extinction", "transmittance",
@@ -92,10 +92,8 @@ def expand(
 
 
 def _present(design: SensorDesign, path: str) -> Any:
-    """Return the value at a path.
-
-    Raises:
-        DesignError: there is none; the hint also names the moves that a search can vary.
+    """Return the value at a path; the error where there is none also names the moves of lights and
+    parts.
     """
     try:
         return get_value(design, path)
@@ -109,11 +107,7 @@ def _present(design: SensorDesign, path: str) -> Any:
 
 
 def starred(design: SensorDesign, path: str) -> list[str]:
-    """Return the paths that match one with a wildcard: `lights.*.colour`, `lights.lg*.flux`.
-
-    Raises:
-        SearchError: the wildcard is not in a name, or matches none.
-    """
+    """Return the paths that match one with a wildcard: `lights.*.colour`, `lights.lg*.flux`."""
     section, _, rest = path.partition(".")
     pattern, _, leaf = rest.partition(".")
     sections: dict[str, Collection[str]] = {
@@ -142,11 +136,7 @@ def starred(design: SensorDesign, path: str) -> list[str]:
 def _together(
     design: SensorDesign, path: str, spec: Together
 ) -> tuple[SensorDesign, list[Parameter]]:
-    """Return parameters that each set the same number of all names that a star stands for.
-
-    Raises:
-        SearchError: the path has no star, or the values can't be varied together.
-    """
+    """Return parameters that each set the same number of all names that a star stands for."""
     if "*" not in path:
         raise SearchError(
             "only values of a path with a * vary together", where=path, hint="Remove /together"
@@ -167,7 +157,7 @@ def _together(
     for same in zip(*members, strict=True):
         first = same[0]
         moves = tuple(each.variable for each in same if each.variable is not None)
-        movable = all(isinstance(each, GroupShift | GroupTurn | GroupAim) for each in moves)
+        movable = all(isinstance(each, LightShift | LightTurn | GroupTurn) for each in moves)
         if not movable or any(each.kind != first.kind for each in same):
             raise one_by_one
         name = f"{section}.{pattern}.{first.name.split('.', 2)[2]}"

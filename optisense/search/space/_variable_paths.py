@@ -38,8 +38,6 @@ from optisense.search.space.design_variables import (
 )
 from optisense.search.space.rigid_moves import (
     CameraTurn,
-    GroupAim,
-    GroupShift,
     GroupTurn,
     LightShift,
     LightTurn,
@@ -48,9 +46,9 @@ from optisense.search.space.rigid_moves import (
 )
 
 MOVES: dict[tuple[str, str], Callable[[str, str, int], DesignVariable]] = {
-    ("lights", "shift"): GroupShift,
+    ("lights", "shift"): LightShift,
     ("lights", "turn"): GroupTurn,
-    ("lights", "aim"): GroupAim,
+    ("lights", "aim"): LightTurn,
     ("camera", "turn"): CameraTurn,
     ("parts", "shift"): PartShift,
     ("parts", "turn"): PartTurn,
@@ -58,11 +56,7 @@ MOVES: dict[tuple[str, str], Callable[[str, str, int], DesignVariable]] = {
 
 
 def find_variables(design: SensorDesign, path: str) -> list[DesignVariable]:
-    """Return the variables that a path names: none for an ordinary path, three for a whole vector.
-
-    Raises:
-        SearchError, DesignError: the path has a variable's form but names nothing in the design.
-    """
+    """Return the variables that a path names: none for an ordinary path, three for a vector."""
     move = re.fullmatch(
         r"(?:(lights|parts)\.([^.\[\]]+)|(camera))\.(shift|turn|aim)(?:\.([^.]+))?", path
     )

@@ -10,18 +10,15 @@ import numpy as np
 
 from optisense.array_types import FloatArray
 from optisense.design import SensorDesign
+from optisense.design.lights import Light
 from optisense.design.posing import moved, with_camera_turned, with_lights
-from optisense.geometry import TriangleMesh
 from optisense.geometry.rotations import rotation
 from optisense.search.space.design_variables import DesignVariable
 
 
-@dataclass(frozen=True)
 class _Move(DesignVariable):
-    """Move along or about one axis, mm or degrees; 0 changes nothing."""
+    """Move by a number of mm or degrees; 0 changes nothing."""
 
-    name: str
-    axis: int
     stage: ClassVar[int] = 2
     numeric: ClassVar[bool] = True
 
@@ -30,114 +27,78 @@ class _Move(DesignVariable):
         return 0.0
 
 
-class _GroupMove(_Move):
-    """Move of all lights of a group."""
+@dataclass(frozen=True)
+class _AxisMove(_Move):
+    """Move along or about one axis."""
+
+    name: str
+    axis: int
+
+    @property
+    def _direction(self) -> FloatArray:
+        """Direction (3,) of the axis."""
+        return np.eye(3)[self.axis]
+
+
+@dataclass(frozen=True)
+class _LightMove(_AxisMove):
+    """Move of one light of a group, or of all if `index` is None."""
+
+    index: int | None = None
 
     @property
     def values(self) -> list[str]:
-        """Paths of the values or sections of a design that it changes."""
-        return [f"lights.{self.name}.lights"]
+        place = "" if self.index is None else f"[{self.index}]"
+        return [f"lights.{self.name}.lights{place}"]
 
 
-class GroupShift(_GroupMove):
-    """Shift of all lights of a group along an axis of the design."""
+class LightShift(_LightMove):
+    """Shift of lights along an axis of the design."""
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
-        """Return the design with the group shifted by `value` mm."""
-        return with_lights(design, self.name, partial(moved, shift=_along(self.axis, value)))
+        """Return the design with the lights shifted by `value` mm."""
+        move = partial(moved, shift=value * self._direction)
+        return with_lights(design, self.name, move, only=self.index)
 
 
-class GroupTurn(_GroupMove):
+class LightTurn(_LightMove):
+    """Turn of each light about an axis of the design through its own position."""
+
+    def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
+        """Return the design with each of the lights turned by `value` degrees."""
+        turn = rotation(self._direction, value)
+
+        def turned(light: Light) -> Light:
+            place = np.array(light.position)
+            return moved(light, place - turn @ place, turn)
+
+        return with_lights(design, self.name, turned, only=self.index)
+
+
+class GroupTurn(_LightMove):
     """Turn of all lights of a group about an axis of the design through their middle."""
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
         """Return the design with the group turned by `value` degrees."""
         lights = design.lights[self.name].lights
         middle = np.mean([light.position for light in lights], axis=0)
-        turn = rotation(_along(self.axis, 1.0), value)
+        turn = rotation(self._direction, value)
         move = partial(moved, shift=middle - turn @ middle, turn=turn)
         return with_lights(design, self.name, move)
 
 
-class GroupAim(_GroupMove):
-    """Turn of each light of a group about an axis of the design through its own position."""
-
-    def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
-        """Return the design with each light of the group turned by `value` degrees."""
-        for index in range(len(design.lights[self.name].lights)):
-            design = LightTurn(self.path, self.name, self.axis, index).apply(design, value)
-        return design
-
-
 @dataclass(frozen=True)
-class LightShift(_Move):
-    """Shift of one light along an axis of the design."""
-
-    index: int
-
-    @property
-    def values(self) -> list[str]:
-        """Paths of the values or sections of a design that it changes."""
-        return [f"lights.{self.name}.lights[{self.index}]"]
-
-    def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
-        """Return the design with the light shifted by `value` mm."""
-        move = partial(moved, shift=_along(self.axis, value))
-        return with_lights(design, self.name, move, only=self.index)
-
-
-@dataclass(frozen=True)
-class LightTurn(_Move):
-    """Turn of one light about an axis of the design through its position."""
-
-    index: int
-
-    @property
-    def values(self) -> list[str]:
-        """Paths of the values or sections of a design that it changes."""
-        return [f"lights.{self.name}.lights[{self.index}]"]
-
-    def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
-        """Return the design with the light turned by `value` degrees."""
-        place = np.array(design.lights[self.name].lights[self.index].position)
-        turn = rotation(_along(self.axis, 1.0), value)
-        move = partial(moved, shift=place - turn @ place, turn=turn)
-        return with_lights(design, self.name, move, only=self.index)
-
-
-class CameraTurn(_Move):
-    """Turn of the camera about one of its own axes: right, up, viewing direction."""
-
-    @property
-    def values(self) -> list[str]:
-        """Paths of the values or sections of a design that it changes."""
-        return ["camera.direction", "camera.up"]
-
-    def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
-        """Return the design with the camera turned by `value` degrees."""
-        return with_camera_turned(self.axis, design, value)
-
-
-@dataclass(frozen=True)
-class GroupMoves(DesignVariable):
+class GroupMoves(_Move):
     """The same move of several groups of lights."""
 
     members: tuple[DesignVariable, ...]
-    stage: ClassVar[int] = 2
-    numeric: ClassVar[bool] = True
 
     @property
     def paths(self) -> list[str]:
-        """Paths of all moves."""
         return [each.path for each in self.members]
-
-    def start(self, design: SensorDesign) -> float:
-        """Return 0, the value of every move in the starting design."""
-        return 0.0
 
     @property
     def values(self) -> list[str]:
-        """Paths of the values or sections of a design that it changes."""
         return [path for each in self.members for path in each.values]
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
@@ -147,15 +108,34 @@ class GroupMoves(DesignVariable):
         return design
 
 
-class _PartMove(_Move):
+class CameraTurn(_AxisMove):
+    """Turn of the camera about one of its own axes: right, up, viewing direction."""
+
+    @property
+    def values(self) -> list[str]:
+        return ["camera.direction", "camera.up"]
+
+    def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
+        """Return the design with the camera turned by `value` degrees."""
+        return with_camera_turned(self.axis, design, value)
+
+
+class _PartMove(_AxisMove):
     """Move of a part."""
 
     shapes: ClassVar[bool] = True
 
     @property
     def values(self) -> list[str]:
-        """Paths of the values or sections of a design that it changes."""
         return [f"parts.{self.name}"]
+
+    def _moved(self, design: SensorDesign, turn: FloatArray, shift: FloatArray) -> SensorDesign:
+        """Return the design with the part turned by a matrix (3, 3) and shifted by (3,), mm."""
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = turn, shift
+        changed = design.copy()
+        changed.meshes[self.name] = design.meshes[self.name].transformed(matrix)
+        return changed
 
 
 class PartShift(_PartMove):
@@ -163,7 +143,7 @@ class PartShift(_PartMove):
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
         """Return the design with the part shifted by `value` mm."""
-        return _with_mesh(design, self.name, np.eye(3), _along(self.axis, value))
+        return self._moved(design, np.eye(3), value * self._direction)
 
 
 class PartTurn(_PartMove):
@@ -172,22 +152,5 @@ class PartTurn(_PartMove):
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
         """Return the design with the part turned by `value` degrees."""
         middle = design.meshes[self.name].bounds.mean(axis=0)
-        turn = rotation(_along(self.axis, 1.0), value)
-        return _with_mesh(design, self.name, turn, middle - turn @ middle)
-
-
-def _with_mesh(
-    design: SensorDesign, part: str, turn: FloatArray, shift: FloatArray
-) -> SensorDesign:
-    mesh: TriangleMesh = design.meshes[part]
-    matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = turn, shift
-    moved = design.copy()
-    moved.meshes[part] = mesh.transformed(matrix)
-    return moved
-
-
-def _along(axis: int, length: float) -> FloatArray:
-    vector = np.zeros(3)
-    vector[axis] = length
-    return vector
+        turn = rotation(self._direction, value)
+        return self._moved(design, turn, middle - turn @ middle)
