@@ -25,7 +25,6 @@ from optisense.search import SearchProgress, search
 from optisense.search.evaluation.evaluator import DesignEvaluator
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.executors import ExecutorRunner, ProcessPool, _remote
-from optisense.search.executors._remote_worker import score_trial
 from optisense.search.space.search_space import BoundSpace, SearchSpace
 
 LINE = {"coating.specularity": (0.0, 1.0, 11)}
@@ -155,10 +154,10 @@ needs_dask = pytest.mark.skipif(
 )
 
 
-def test_a_remote_worker_without_a_package_of_the_search_names_itself_and_the_package() -> None:
+def test_a_remote_without_a_package_of_the_search_names_itself_and_the_package() -> None:
     evaluator = b"cno_such_package\nObjective\n."  # a pickle that names a class of a module
     with pytest.raises(SetupError, match="No module named 'no_such_package'") as found:
-        score_trial("a search", evaluator, np.zeros(1), 0)
+        _remote.score_trial("a search", evaluator, np.zeros(1), 0)
     assert socket.gethostname() in found.value.message
     assert "Install the same packages" in str(found.value.hint)
 

@@ -1,19 +1,25 @@
-"""Executors for any object with the protocol of `concurrent.futures`, and for a Dask cluster."""
+"""Executors for any object with the protocol of `concurrent.futures`, and for a Dask cluster, with
+the functions that their workers call: these keep an evaluator and score trials.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import os
+import pickle
 import re
+import socket
+import threading
 from concurrent.futures import Executor, Future
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.errors import SetupError
+from optisense.errors import OptiSenseError, SetupError
 from optisense.search.evaluation.evaluator import Evaluator
 from optisense.search.evaluation.outcome import Outcome
-from optisense.search.executors._remote_worker import score_trial
 from optisense.search.executors.base import Runner, pickled
 
 CONNECT_SECONDS = 10.0
@@ -34,27 +40,28 @@ HOW_TO_START = (
     "that scores trials"
 )
 
+_evaluators: dict[str, Evaluator] = {}
+_blobs: dict[str, bytes] = {}
+MOST_EVALUATORS = 64
+"""Largest number of pickled evaluators that a worker keeps. A search that ends removes its own; one
+whose process was killed does not.
+"""
+_one_at_a_time = threading.Lock()
+"""Lock that serves one trial at a time, since an evaluator keeps one model for all threads."""
+
 
 class ExecutorRunner(Runner):
     """Trials on an executor that the caller has set up (MPI, a batch system, threads, ...)."""
 
     def __init__(self, evaluator: Evaluator, executor: Executor) -> None:
-        """Take an executor; `close` does not shut it down.
-
-        Raises:
-            SearchError: the evaluator can't be pickled.
-        """
+        """Take an executor; `close` does not shut it down."""
         self._blob = pickled(evaluator)
         self._key = hashlib.sha256(self._blob).hexdigest()
         self._executor = executor
         self.window = SUBMITTED_AHEAD
 
     def submit(self, vector: NDArray[np.float64], seed: int) -> Future[Outcome]:
-        """Submit a trial to the executor; see `Runner.submit`.
-
-        Args:
-            vector: point (n,).
-        """
+        """Submit the trial of a point (n,) to the executor; see `Runner.submit`."""
         return self._executor.submit(score_trial, self._key, self._blob, vector, seed)
 
     def close(self) -> None:
@@ -81,9 +88,11 @@ class DaskRunner(Runner):
         self._client = _connect(address)
         try:
             _wait_for_a_worker(self._client, address)
-            from optisense.search.executors._dask_plugin import EvaluatorPlugin
+            from optisense.search.executors._dask_plugin import PreparingPlugin
 
-            plugin = EvaluatorPlugin(self._key, blob)
+            plugin = PreparingPlugin(
+                partial(store_evaluator, self._key, blob), partial(drop_evaluator, self._key)
+            )
             self._client.register_plugin(plugin, name=self._plugin_name)
         except BaseException:
             self._client.close()
@@ -93,11 +102,7 @@ class DaskRunner(Runner):
         self.window = SUBMITTED_AHEAD
 
     def submit(self, vector: NDArray[np.float64], seed: int) -> Future[Outcome]:
-        """Submit a trial to the cluster; see `Runner.submit`.
-
-        Args:
-            vector: point (n,).
-        """
+        """Submit the trial of a point (n,) to the cluster; see `Runner.submit`."""
         given = self._executor.submit(score_trial, self._key, None, vector, seed)
         future: Future[Outcome] = Future()
         given.add_done_callback(lambda done: _settle(done, future))
@@ -111,11 +116,7 @@ class DaskRunner(Runner):
 
 
 def _connect(address: str) -> Any:
-    """Return a client of the scheduler at an address.
-
-    Raises:
-        SetupError: Dask is not installed, or no scheduler answers.
-    """
+    """Return a client of the scheduler at an address."""
     if not ADDRESS.fullmatch(address):
         raise SetupError(
             f"'{address}' is not the address of a Dask scheduler",
@@ -149,9 +150,7 @@ def _wait_for_a_worker(client: Any, address: str) -> None:
 
 
 def _settle(done: Future[Outcome], future: Future[Outcome]) -> None:
-    """Copy the result of a future to another one; Dask's error about a trial whose workers keep
-    dying becomes the failure of that trial.
-    """
+    """Copy a result to another future; a trial whose workers keep dying fails."""
     if done.cancelled():
         future.cancel()
         return
@@ -162,3 +161,58 @@ def _settle(done: Future[Outcome], future: Future[Outcome]) -> None:
         future.set_result(Outcome({}, "the workers that scored it died repeatedly"))
     else:
         future.set_exception(error)
+
+
+def score_trial(key: str, blob: bytes | None, vector: NDArray[np.float64], seed: int) -> Outcome:
+    """Score a point (n,) in the process where this is called, by the pickled evaluator, which is
+    None if it was sent before by `store_evaluator`.
+    """
+    with _one_at_a_time:
+        if key not in _evaluators:
+            known = blob if blob is not None else _blobs.get(key)
+            if known is None:
+                raise SetupError(
+                    "a worker has no evaluator: the study has ended, or the worker has restarted"
+                )
+            evaluator = _unpacked(known)
+            if getattr(evaluator, "renders", True):
+                from optisense.optics.backend.variant import use_threads
+
+                use_threads(1)
+            _evaluators.clear()
+            _evaluators[key] = evaluator
+        outcome = _evaluators[key](vector, seed)
+    object.__setattr__(outcome, "worker", _own_name())
+    return outcome
+
+
+def _unpacked(blob: bytes) -> Evaluator:
+    try:
+        evaluator: Evaluator = pickle.loads(blob)
+    except OptiSenseError:
+        raise
+    except Exception as error:
+        raise SetupError(
+            f"the worker {_own_name()} can't read the search: {type(error).__name__}: {error}",
+            hint="Install the same packages on the machines of all workers, with those of own "
+            "kinds and objectives",
+        ) from error
+    return evaluator
+
+
+def store_evaluator(key: str, blob: bytes) -> None:
+    """Keep an evaluator for `score_trial` in this process, and drop the oldest of too many."""
+    _blobs[key] = blob
+    while len(_blobs) > MOST_EVALUATORS:
+        del _blobs[next(iter(_blobs))]
+
+
+def drop_evaluator(key: str) -> None:
+    """Drop the evaluator stored under a key."""
+    _blobs.pop(key, None)
+    _evaluators.pop(key, None)
+
+
+def _own_name() -> str:
+    """Return the names of the machine and the process that score a trial."""
+    return f"{socket.gethostname()}:{os.getpid()}"

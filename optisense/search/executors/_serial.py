@@ -25,24 +25,15 @@ class SerialRunner(Runner):
     """
 
     def __init__(self, evaluator: Evaluator, on_wait: Callable[[], None] | None = None) -> None:
-        """Store the evaluator; nothing is started yet.
-
-        Args:
-            on_wait: function that is called when Ctrl-C is pressed during a trial.
-        """
+        """Store the evaluator, and the function that is called on Ctrl-C during a trial."""
         self._evaluator = evaluator
         self._on_wait = on_wait
         self._pressed = 0
         self._before: Callable[[int, FrameType | None], object] | int | None = None
 
     def submit(self, vector: NDArray[np.float64], seed: int) -> Future[Outcome]:
-        """Score a trial and return a finished future.
-
-        Args:
-            vector: point (n,).
-
-        Raises:
-            KeyboardInterrupt: Ctrl-C was pressed before this trial, or twice during it.
+        """Score a point (n,) and return a finished future; KeyboardInterrupt follows if Ctrl-C was
+        pressed before this trial, or twice during it.
         """
         if self._pressed:
             raise KeyboardInterrupt
@@ -59,9 +50,7 @@ class SerialRunner(Runner):
 
     def report_progress_to(self, callback: Callable[[float, str], None]) -> None:
         """Call `callback` with the progress of the current trial, if its evaluator reports it."""
-        report_progress_to = getattr(self._evaluator, "report_progress_to", None)
-        if report_progress_to is not None:
-            report_progress_to(callback)
+        getattr(self._evaluator, "report_progress_to", lambda callback: None)(callback)
 
     def close(self) -> None:
         """Restore the handler of Ctrl-C."""

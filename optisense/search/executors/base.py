@@ -42,6 +42,9 @@ class Runner(ABC):
             vector: point (n,) of the search space.
         """
 
+    def report_progress_to(self, callback: Callable[[float, str], None]) -> None:  # noqa: B027
+        """Call `callback` with the progress of a trial, if it is scored in this process."""
+
     @abstractmethod
     def close(self) -> None:
         """Stop all work at once; unfinished trials are dropped."""

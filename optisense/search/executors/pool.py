@@ -71,11 +71,7 @@ class _Worker:
     task: _Task | None = None
 
     def ask(self, message: Any) -> Any:
-        """Send a message to the worker and wait for the answer.
-
-        Raises:
-            EOFError, OSError: the worker has died.
-        """
+        """Send a message to the worker and wait for the answer."""
         assert self.process.stdin is not None and self.process.stdout is not None
         send(self.process.stdin, message)
         return receive(self.process.stdout)
@@ -109,11 +105,7 @@ class ProcessPool(Runner):
             threading.Thread(target=self._supervise, args=(place,), daemon=True).start()
 
     def submit(self, vector: NDArray[np.float64], seed: int) -> Future[Outcome]:
-        """Submit a trial to the next free worker; see `Runner.submit`.
-
-        Args:
-            vector: point (n,).
-        """
+        """Submit the trial of a point (n,) to the next free worker; see `Runner.submit`."""
         task = _Task(vector, seed, Future())
         with self._changed:
             if self._error is not None:
@@ -165,12 +157,7 @@ class ProcessPool(Runner):
             self._give_up(SetupError(f"a worker could not be started: {error}"))
 
     def _serve(self, worker: _Worker) -> None:
-        """Prepare a worker and give it tasks until the pool is closed.
-
-        Raises:
-            EOFError, OSError: the worker has died.
-            OptiSenseError: the worker reports that it can't score any trial.
-        """
+        """Prepare a worker and give it tasks until the pool is closed or the worker dies."""
         kind, content = worker.ask((self._blob, self._threads))
         if kind == "setup-error":
             raise content

@@ -15,7 +15,7 @@ from optisense.array_types import FloatArray
 from optisense.errors import SearchError
 from optisense.search.evaluation.evaluator import Evaluator
 from optisense.search.evaluation.outcome import Outcome
-from optisense.search.executors import Runner, SerialRunner
+from optisense.search.executors import Runner
 from optisense.search.executors.base import TICK, run_jobs
 from optisense.search.methods import Method, Problem, make
 from optisense.search.study._definitions import SCORING, refuse_other_definitions
@@ -155,8 +155,7 @@ class StudyRun:
     def _running(self, evaluator: Evaluator) -> Iterator[Runner]:
         """Yield a runner of an evaluator, which ends with the block."""
         with self._make_runner(evaluator) as runner:
-            if isinstance(runner, SerialRunner):
-                runner.report_progress_to(self._trial_progress)
+            runner.report_progress_to(self._trial_progress)
             yield runner
 
     def _search(self, runner: Runner) -> str:
@@ -184,12 +183,8 @@ class StudyRun:
             self._watch_reading()
 
     def _ask(self) -> FloatArray:
-        """Return the next generation (k, n) of the method.
-
-        Coordinates that miss a bound or a whole number by rounding are moved onto it.
-
-        Raises:
-            SearchError: the method proposes anything but points of the space.
+        """Return the next generation (k, n) of the method. Coordinates that miss a bound or a whole
+        number by rounding are moved onto it; SearchError if one is no point of the space.
         """
         space, given, name = self.study.space, self.method.ask(), self.study.settings.method
         hint = "The method must be repaired: its ask() must return points (k, n) of its space"
@@ -225,10 +220,8 @@ class StudyRun:
             self._watch.update(last=last)
 
     def _check_definitions(self, runner: Runner) -> None:
-        """Score the first finished trial of an earlier release again, with the seed of the study.
-
-        Raises:
-            SearchError: its scores are other ones now, so that new trials could not be compared.
+        """Score the first finished trial of an earlier release again; SearchError if it scores
+        otherwise.
         """
         settings = self.study.settings
         first = next((trial for trial in self.study.trials if not trial.outcome.failed), None)
@@ -247,10 +240,8 @@ class StudyRun:
         self._score_rows(runner, rows)
 
     def _score_rows(self, runner: Runner, rows: Sequence[Row]) -> None:
-        """Score the rows that are not finished, and write each as it finishes.
-
-        A point that was scored before keeps its score: a grid holds the start, and choices and
-        integers repeat.
+        """Score the rows that are not finished, and write each as it finishes. A point that was
+        scored before keeps its score: a grid holds the start, and choices and integers repeat.
         """
         by_number = {row.number: row for row in rows if row.outcome is None}
 

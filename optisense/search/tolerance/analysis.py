@@ -19,7 +19,7 @@ from optisense.objectives.score import deviation_of
 from optisense.search.evaluation.evaluator import DesignEvaluator, Goal, as_goals
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.evaluation.robust import HIGH, LOW, MIDDLE
-from optisense.search.executors import Runner, SerialRunner, Workers, create_runner
+from optisense.search.executors import Runner, Workers, create_runner
 from optisense.search.executors.base import run_jobs
 from optisense.search.space.manufacturing import ManufacturingErrors, ToleranceDistribution
 from optisense.search.study.failures import cause_of
@@ -308,8 +308,7 @@ def _work(
         progress(done, len(jobs), "")
 
     progress(0, len(jobs), "")
-    if isinstance(runner, SerialRunner):
-        runner.report_progress_to(lambda part, doing: progress(done, len(jobs), doing))
+    runner.report_progress_to(lambda part, doing: progress(done, len(jobs), doing))
     try:
         run_jobs(runner, [(number, *job) for number, job in enumerate(jobs)], finished)
     except KeyboardInterrupt:
