@@ -15,22 +15,14 @@ LARGEST_BALL = 1000.0
 
 
 def _family(name: str) -> str:
-    """Return the name of a family of numbers that a calibration may fit.
-
-    Raises:
-        ValueError: there is no such family.
-    """
+    """Return the name of a family of numbers that a calibration may fit."""
     from optisense.calibration.families import FAMILIES
 
     return one_of(FAMILIES)(name)
 
 
 def _number_range(text: str) -> tuple[str, float, float]:
-    """Return the path, the lowest and the highest value of a PATH=LO:HI.
-
-    Raises:
-        ValueError: the text is something else.
-    """
+    """Return the path, the lowest and the highest value of a PATH=LO:HI."""
     path, equals, given = text.partition("=")
     low, colon, high = given.partition(":")
     try:

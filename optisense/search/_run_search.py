@@ -154,10 +154,8 @@ def run_study(
 
 
 def _hint_after(error: OptiSenseError, study: Study) -> str | None:
-    """Return a hint for an error of a run, which also tells the state of the study.
-
-    A study that was created for this run, and in which nothing was scored, is removed, so that the
-    same call can be repeated.
+    """Return a hint for an error of a run, which also tells the state of the study. A new study in
+    which nothing was scored is removed, so that the same call can be repeated.
     """
     if study.folder is None or (isinstance(error, SearchError) and error.hint):
         return error.hint

@@ -107,11 +107,8 @@ def _full_size(design: SensorDesign, settings: Mapping[str, Any]) -> tuple[int, 
 
 
 def _smallest_contact(evaluation: Evaluation) -> int:
-    """Return the number of pixels of the smallest contact of an evaluation: those whose points on
-    the untouched skin the ball touches.
-
-    Raises:
-        OptiSenseError: there are no places of contacts.
+    """Return the number of pixels of the smallest contact: those whose points on the untouched skin
+    the ball touches.
     """
     ball, depth = evaluation.settings.radius, evaluation.settings.depth
     reach = math.sqrt(depth * (2.0 * ball - depth))

@@ -288,8 +288,8 @@ class DesignEvaluator(PickledWithoutCaches):
             self.kept.append(SameMirrors(design, self.models))
 
     def _names_to_watch(self) -> tuple[str, ...]:
-        """Return the names of the objectives that are scored beside those of goals and conditions,
-        so that a report can say what a higher score costs.
+        """Return the objectives that are scored beside goals and conditions, to tell what a score
+        costs.
         """
         watched = WATCHED_OBJECTIVES if may_change_view(self.space.names) else ()
         texts = [each for each in self._objectives if isinstance(each, str)]
@@ -300,10 +300,7 @@ class DesignEvaluator(PickledWithoutCaches):
 
     @cached_property
     def _all_objectives(self) -> list[Objective]:
-        """Objectives of goals and conditions, and those that are watched, each once.
-
-        A user's file is run once per process and not once per trial.
-        """
+        """Objectives of goals and conditions, and those that are watched, each once."""
         watched = [find(name) for name in self._watched]
         return list({each.name: each for each in [*self._goal_objectives, *watched]}.values())
 

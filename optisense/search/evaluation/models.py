@@ -20,11 +20,7 @@ class ModelCache(PickledWithoutCaches):
     """Cache of one optical model, for designs that are variations of one design."""
 
     def __init__(self, variant: str = "auto", *, coarse: bool = False) -> None:
-        """Store the variant; the model is built on first use.
-
-        Args:
-            coarse: whether images are coarse (see `optisense.optics.drafts`).
-        """
+        """Store the variant, and whether images are coarse; the model is built on first use."""
         self.variant = variant
         self.coarse = coarse
 

@@ -35,12 +35,8 @@ class RelitEvaluator(DesignEvaluator):
     """Evaluator of designs that differ only in the colours and powers of their lights."""
 
     def __init__(self, usual: DesignEvaluator, *, brief: bool = False) -> None:
-        """Copy the settings of the usual evaluator; nothing is rendered yet.
-
-        Args:
-            usual: the evaluator whose scores are found.
-            brief: whether thousands of trials follow, so that nothing is watched and only the main
-                numbers of scores are stored.
+        """Copy the settings of the usual evaluator; nothing is rendered yet. With `brief`, for
+        thousands of trials, nothing is watched and only the main numbers of scores are stored.
         """
         self.brief = brief
         super().__init__(
@@ -129,10 +125,8 @@ class _SeedImages:
 
 
 def _reads_contacts_only(objective: Objective) -> bool:
-    """Return whether an objective reads no pixel outside of the contacts, which is known of
-    built-in objectives only.
-
-    A user's objective may read pixels around a contact.
+    """Return whether an objective reads no pixel outside of the contacts. A user's objective may
+    read pixels around a contact.
     """
     own = objective.function.__module__.startswith("optisense.objectives.")
     return own and objective.reads is not None

@@ -167,8 +167,8 @@ def requirements_of(texts: Iterable[str]) -> list[Requirement]:
 
 
 def _refuse_impossible(wanted: Requirement) -> None:
-    """Raise SearchError if no design can meet a limit, as no setting changes the range of its
-    quantity, or if it names no objective.
+    """Raise SearchError if a quantity is unknown, or if its range, with any settings, excludes a
+    limit.
     """
     measured = wanted.objective()
     if callable(measured.range):

@@ -42,11 +42,7 @@ class RobustEvaluator:
     def __init__(
         self, usual: DesignEvaluator, errors: ManufacturingErrors, seed: int, samples: int = SAMPLES
     ) -> None:
-        """Draw the errors.
-
-        Raises:
-            DesignError, SearchError: the path of an error does not fit the design.
-        """
+        """Draw the errors."""
         self.usual = usual
         self.errors = errors
         self.renders = usual.renders
@@ -100,9 +96,7 @@ class RobustEvaluator:
         return Outcome(scores, failure, parts, time.perf_counter() - began)
 
     def _errors(self, bound: BoundManufacturingErrors) -> FloatArray:
-        """Return the errors, (samples, d); designs with equally many erroneous values get the
-        same.
-        """
+        """Return the errors (samples, d), the same for designs with as many erroneous values."""
         if bound.size not in self._drawn:
             shares = latin_hypercube(self.samples, bound.size, self.seed)
             self._drawn[bound.size] = bound.errors(shares)
@@ -110,9 +104,8 @@ class RobustEvaluator:
 
 
 def _reached(wanted: Requirement, found: Sequence[Outcome]) -> float:
-    """Return the value of a limited quantity that nine of ten manufactured sensors reach: the tenth
-    percentile for a lower limit, the ninetieth for an upper limit; NaN if it falls among sensors
-    without a value.
+    """Return the value of a limited quantity that nine of ten manufactured sensors reach: P10 for a
+    lower limit, P90 for an upper one; NaN if it falls among sensors without a value.
     """
     measured = [outcome.conditions.get(str(wanted)) for outcome in found]
     values = np.array([math.nan if value is None else value for value in measured])

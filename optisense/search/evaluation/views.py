@@ -43,11 +43,7 @@ class SameMirrors:
     """
 
     def __init__(self, design: SensorDesign, models: ModelCache) -> None:
-        """Store the design; nothing is traced yet.
-
-        Args:
-            design: design that the search starts from.
-        """
+        """Store the design that the search starts from; nothing is traced yet."""
         self._design = design
         self._models = models
         self._ways: frozenset[frozenset[str]] | None = None

@@ -68,22 +68,15 @@ class AugmentedLagrangian:
     def initial(
         requirements: Sequence[Requirement], score: float, offsets: FloatArray
     ) -> AugmentedLagrangian:
-        """Return the merit function of the first ascent.
-
-        Args:
-            offsets: see the attribute, (m,).
-        """
+        """Return the merit function of the first ascent; see the attribute for `offsets` (m,)."""
         weight = WEIGHT * max(abs(score), CONDITION_TOLERANCE)
         return AugmentedLagrangian(
             tuple(requirements), np.zeros(len(requirements)), weight, offsets
         )
 
     def merit(self, values: FloatArray, gradients: FloatArray) -> tuple[float, FloatArray]:
-        """Return the merit function, which is maximised, and its gradient (n,).
-
-        Args:
-            values: score and limited quantity of each condition, (1 + m,).
-            gradients: gradients of `values`, (1 + m, n).
+        """Return the merit function, which is maximised, and its gradient (n,), for the score and
+        the limited quantities, `values` (1 + m,), and their gradients (1 + m, n).
         """
         pull = np.maximum(0.0, self.multipliers + self.weight * self.violations(values))
         cost = float((pull**2 - self.multipliers**2).sum()) / (2.0 * self.weight)
@@ -95,11 +88,8 @@ class AugmentedLagrangian:
         return self._signs() * (values[1:] + self.offsets - limits) + LIMIT_MARGIN
 
     def updated(self, values: FloatArray, offsets: FloatArray) -> AugmentedLagrangian:
-        """Return the merit function of the next ascent.
-
-        Args:
-            values: score and limited quantities, (1 + m,), at the end of the last ascent.
-            offsets: see the attribute, (m,).
+        """Return the merit function of the next ascent, for the score and the limited quantities (1
+        + m,) at the end of the last one, and new offsets (m,).
         """
         violation = self.violations(values)
         most = float(violation.max())

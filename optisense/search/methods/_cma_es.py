@@ -168,8 +168,8 @@ class CmaEs(Method):
 
     @contextmanager
     def _own_randomness(self) -> Iterator[None]:
-        """Set NumPy's global generator to this method's state, and restore it at the end; limit
-        linear algebra to one thread meanwhile.
+        """Set NumPy's global generator to this method's state and linear algebra to one thread, for
+        a while.
         """
         theirs = np.random.get_state()
         np.random.set_state(self._state)
@@ -183,19 +183,15 @@ class CmaEs(Method):
 
 @cache
 def _linear_algebra() -> Any:
-    """Return the limit on the threads of the libraries of linear algebra, which takes milliseconds
-    to look up.
-
-    The matrices of pycma are small: threads only wait for each other, and round differently.
+    """Return the limit on the threads of linear algebra, which takes milliseconds to look up. The
+    matrices of pycma are small: threads only wait for each other, and round differently.
     """
     return ThreadpoolController().select(user_api="blas")
 
 
 def _pycma() -> Any:
-    """Import pycma without what it imports for its plots and surrogate models, which are not used.
-
-    It does without both where they are not installed. They would take three quarters of a second of
-    the start of a search.
+    """Import pycma without what it imports for plots and surrogate models, which are not used and
+    would take three quarters of a second. It does without both where they are not installed.
     """
     unused = [name for name in ("matplotlib", "scipy.stats") if name not in sys.modules]
     for name in unused:

@@ -81,12 +81,9 @@ class Combinations(Method):
     def climb(
         self, stage: str, movable: Sequence[Sequence[int]], start: Combination | None = None
     ) -> Iterator[Stage]:
-        """Yield the stages of a hill climb: all changes of one set of parameters that move together
-        are tried, and the best is taken, until none is an improvement.
-
-        Args:
-            movable: sets of parameters that move together; those of a set have the same levels.
-            start: first combination; the best so far if None.
+        """Yield the stages of a hill climb from a combination, or from the best so far: all changes
+        of one set of parameters that move together (and have the same levels) are tried, and the
+        best is taken, until none is an improvement.
         """
         here = start if start is not None else self.best()
         yield stage, [here]
@@ -140,11 +137,7 @@ def changed(combination: Combination, members: Sequence[int], level: int) -> Com
 
 
 def levels_of(space: BoundSpace) -> list[tuple[float, ...]]:
-    """Return the levels of each parameter.
-
-    Raises:
-        SearchError: a parameter has no levels.
-    """
+    """Return the levels of each parameter; SearchError if one has none."""
     found = []
     for parameter in space.parameters:
         levels = parameter.kind.levels

@@ -91,12 +91,7 @@ class FeasibleRegion:
     def __init__(
         self, space: BoundSpace, constraints: Sequence[Constraint], parts: Sequence[str]
     ) -> None:
-        """Store the constraints; nothing is computed yet.
-
-        Args:
-            constraints: constraints that a design must meet.
-            parts: names of the parts whose shapes points change.
-        """
+        """Store the constraints, and the names of the parts whose shapes points change."""
         self._space = space
         self._span = space.upper - space.lower
         self._constraints = list(constraints)
@@ -105,9 +100,8 @@ class FeasibleRegion:
         self._moves: Jacobian | None = None
 
     def allows(self, unit: FloatArray) -> bool:
-        """Return whether no constraint forbids a point (n,), in units of the ranges.
-
-        If a constraint raises an error the point is allowed: its evaluator reports the error.
+        """Return whether no constraint forbids a point (n,), in units of the ranges. One at which a
+        constraint raises an error is allowed: its evaluator reports the error.
         """
         try:
             return why_forbidden(self._design(unit), self._constraints) is None
@@ -115,11 +109,8 @@ class FeasibleRegion:
             return True
 
     def nearest(self, wanted: FloatArray, allowed: FloatArray) -> FeasiblePoint:
-        """Return a feasible point near a wanted one, both (n,) in units of the ranges.
-
-        Args:
-            wanted: wanted point (n,), 0 to 1.
-            allowed: a feasible point (n,), the fallback of the bisection.
+        """Return a feasible point near a wanted one, by bisection towards the feasible point
+        `allowed` if nothing else helps; points are (n,), in units of the ranges, 0 to 1.
         """
         if self.allows(wanted):
             return FeasiblePoint.unchanged(wanted)

@@ -48,11 +48,7 @@ class PointsWantedError(Exception):
 
 def source_of(problem: Problem) -> tuple[GradientSource, list[str]]:
     """Return the source of the gradients for a problem, and for derivatives of rays also the parts
-    that points move.
-
-    Raises:
-        SearchError: a parameter is a choice or an integer, or, for derivatives of rays, changes no
-            ray.
+    that points move; SearchError if a parameter has no gradient.
     """
     space, objective = problem.space, problem.objectives[0]
     for number in np.flatnonzero(space.discrete):
@@ -83,11 +79,9 @@ class TrialDifferences:
         self._requirements = requirements
 
     def around(self, point: FloatArray, known: Mapping[bytes, Outcome]) -> LocalValues | None:
-        """Return values and gradients at a point (n,), or None if it has no score. If the trial on
-        one side failed, a one-sided difference is taken.
-
-        Raises:
-            PointsWantedError: the point or its neighbours must be scored first.
+        """Return values and gradients at a point (n,), or None if it has no score;
+        PointsWantedError if points must be scored first. If the trial on one side failed, the
+        difference is one-sided.
         """
         sides = self._beside(point)
         wanted = [each for each in (point, *sides) if each.tobytes() not in known]

@@ -45,12 +45,8 @@ class Jacobian:
 
 
 def moving_parts(space: BoundSpace) -> list[str]:
-    """Return the names of the parts whose shape a point of the space changes.
-
-    All parameters must be continuous.
-
-    Raises:
-        SearchError: chief rays have no derivative by a parameter.
+    """Return the names of the parts whose shape a point of the space, all of whose parameters are
+    continuous, changes; SearchError if chief rays have no derivative by a parameter.
     """
     start = space.apply(space.start)
     meshes = start.deformed_meshes()
@@ -102,8 +98,8 @@ def predicts(known: Jacobian, space: BoundSpace, design: SensorDesign, point: Fl
 
 
 def camera_numbers(camera: Camera) -> FloatArray:
-    """Return the numbers of a camera, (13,) or more: position (mm), the rows of the camera's axes,
-    the field of view (degrees), and the coefficients of the lens's distortion.
+    """Return the numbers of a camera, (13,) or more: position (mm), rows of the camera's axes,
+    field of view (degrees), coefficients of the distortion.
     """
     lens = () if camera.distortion is None else camera.distortion.coefficients()
     return np.concatenate([camera.position, np.ravel(camera.axes()), [camera.fov], lens])

@@ -58,10 +58,8 @@ class LightColours(Combinations):
 
 
 def _levels(space: BoundSpace) -> list[tuple[float, ...]]:
-    """Return the levels of each parameter.
-
-    Raises:
-        SearchError: a parameter is no colour or power of a light group, or has no levels.
+    """Return the levels of each parameter; SearchError if one is no colour or power of a light
+    group.
     """
     for parameter in space.parameters:
         paths = [target.path for target in parameter.targets]

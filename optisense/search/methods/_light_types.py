@@ -94,10 +94,8 @@ def _groups(space: BoundSpace) -> list[list[int]]:
 
 
 def _options(space: BoundSpace) -> int:
-    """Return the number of types, which is the same for all lights.
-
-    Raises:
-        SearchError: the space has a parameter that is not the type of a light.
+    """Return the number of types, which is the same for all lights; SearchError for other
+    parameters.
     """
     for parameter in space.parameters:
         if not isinstance(parameter.variable, LightType):

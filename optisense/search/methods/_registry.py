@@ -87,11 +87,7 @@ def make(name: str, problem: Problem, options: dict[str, Any] | None = None) -> 
 
 
 def _typed_options(name: str, kind: type[Method], options: dict[str, Any]) -> dict[str, Any]:
-    """Return options of a method in the types of its constructor's arguments.
-
-    Raises:
-        SearchError: an option is unknown, or has another type.
-    """
+    """Return options in the types of the constructor's arguments; SearchError if one is invalid."""
     try:
         signature = inspect.signature(kind.__init__, eval_str=True)
     except Exception:  # a name of an annotation may be known to type checkers only

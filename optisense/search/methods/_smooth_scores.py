@@ -36,11 +36,8 @@ class SmoothScore:
         return SmoothScore(expression) if smooth else None
 
     def slopes(self, rays: Rays, settings: Mapping[str, Any]) -> Slopes:
-        """Return the value for some rays, and its derivatives by the points and directions of
-        these.
-
-        Args:
-            settings: settings of the objectives; those that a smooth form lacks are ignored.
+        """Return the value for some rays, and its derivatives by their points and directions.
+        Settings that a smooth form lacks are ignored.
         """
         found: dict[ScoreTerm, Slopes] = {}
         for each in self.expression.quantities:

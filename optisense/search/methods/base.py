@@ -116,8 +116,8 @@ def values_to_maximise(outcomes: Sequence[Outcome], objective: str) -> FloatArra
 
 
 def _put_below(values: FloatArray, lower: BoolArray, upper: BoolArray, amounts: FloatArray) -> None:
-    """Set values of some trials (k,) to numbers below those of some others, in the order of falling
-    amounts (k,).
+    """Set values of some trials (k,) below those of some others, in the order of falling amounts
+    (k,).
     """
     if not lower.any():
         return

@@ -188,13 +188,9 @@ class GradientEvaluator(PickledWithoutCaches):
         return CheckedGradient(values, gradients, GradientSource.DIFFERENCES, steady)
 
     def _by_rays(self, vector: FloatArray, seed: int) -> CheckedGradient:
-        """Return the smoothed values at a point (n,) and their gradients by ray derivatives; by
-        differences for quantities without a smooth form.
-
-        Raises:
-            NoDerivativeError: ray derivatives are not defined for a part that moves.
-            _ContradictedError: differences of the true score contradict the gradient.
-            OptiSenseError: the design can't be built, or no ray arrives.
+        """Return the smoothed values at a point (n,) and their gradients by ray derivatives, or by
+        differences for quantities without a smooth form; _ContradictedError if differences of the
+        true score contradict them.
         """
         values, gradients = self._slopes(vector)
         holds = None
@@ -238,9 +234,6 @@ class GradientEvaluator(PickledWithoutCaches):
     def _slopes(self, vector: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the smoothed values (1 + m,) at a point, and their gradients (1 + m, n) by ray
         derivatives; NaN for quantities without a smooth form.
-
-        Raises:
-            NoDerivativeError, OptiSenseError: see `gradient`.
         """
         space = self.usual.space
         design = space.apply(vector)

@@ -165,10 +165,8 @@ class Gradient(Method):
         return np.empty((0, space.size))
 
     def _climb(self, unit: FloatArray) -> None:
-        """Ascend from a point (n,), in units of the ranges, until its conditions are met.
-
-        Raises:
-            PointsWantedError: points must be scored first.
+        """Ascend from a point (n,), in units of the ranges, until its conditions are met. This and
+        the methods below raise PointsWantedError if points must be scored first.
         """
         if not self.requirements:
             self._ascend_again(unit, None)
@@ -205,14 +203,9 @@ class Gradient(Method):
         self, unit: FloatArray, merit: AugmentedLagrangian | None
     ) -> tuple[float, FloatArray]:
         """Ascend from a point (n,), and again from the best point that was reached, as long as that
-        gains something. A line search fails at a kink, and a path along a constraint ends where the
-        direction of ascent leaves the constraint.
-
-        Returns:
-            Maximum of the merit function (of the score if there are no conditions), and its point.
-
-        Raises:
-            PointsWantedError: points must be scored first.
+        gains something: a line search fails at a kink, and a path along a constraint ends where the
+        direction of ascent leaves it. Return the maximum of the merit function, or of the score,
+        and its point.
         """
         best = -np.inf
         while True:
@@ -224,11 +217,8 @@ class Gradient(Method):
     def _ascend(
         self, start: FloatArray, merit: AugmentedLagrangian | None
     ) -> tuple[float, FloatArray]:
-        """Return the best value that an ascent from a point (n,) reaches, and its point, both
-        points in units of the ranges.
-
-        Raises:
-            PointsWantedError: points must be scored first.
+        """Return the best value that an ascent from a point (n,) reaches, and its point, in units
+        of the ranges.
         """
         from scipy.optimize import minimize
 
@@ -266,11 +256,7 @@ class Gradient(Method):
         return best, at
 
     def _around(self, point: FloatArray) -> LocalValues | None:
-        """Return values and gradients at a point (n,), or None if it has no score.
-
-        Raises:
-            PointsWantedError: the point must be scored first.
-        """
+        """Return values and gradients at a point (n,), or None if it has no score."""
         if self.source is GradientSource.TRIALS:
             return self._differences.around(point, self._known)
         outcome = self._known.get(point.tobytes())
@@ -294,8 +280,8 @@ class Gradient(Method):
         return self._places[key]
 
     def _point(self, unit: FloatArray) -> FloatArray:
-        """Return the point (n,) for units of the ranges. The start is returned without rounding,
-        since it is scored already.
+        """Return the point (n,) for units of the ranges; the start, which is scored already,
+        unrounded.
         """
         space = self.space
         point = np.clip(space.lower + unit * (space.upper - space.lower), space.lower, space.upper)

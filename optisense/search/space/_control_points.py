@@ -27,11 +27,7 @@ share; it allows for rounded numbers in files.
 
 
 def as_points(spec: Specification) -> CagePoints:
-    """Return bounds or a reach for all control points, unless single points are given already.
-
-    Raises:
-        SearchError: the specification is a choice or an integer.
-    """
+    """Return bounds or a reach for all control points, unless single points are given already."""
     if isinstance(spec, CagePoints):
         return spec
     if isinstance(spec, Choice | Integer | Together):
@@ -47,12 +43,9 @@ def point_parameters(
     mirror: np.ndarray | None = None,
     free: np.ndarray | None = None,
 ) -> list[Parameter]:
-    """Return parameters for the coordinates of control points (N, 3).
-
-    Args:
-        mirror: box (2, 3), mm, across whose middle coordinates are mirrored; None for blend shares,
-            which are not.
-        free: coordinates (N, 3) that have an effect, bool.
+    """Return parameters for the coordinates of control points (N, 3), of those that have an effect
+    (`free`, (N, 3) bool). Coordinates are mirrored across the middle of the box `mirror` (2, 3),
+    mm; it is None for blend shares, which are not mirrored.
     """
     count = len(now)
     chosen = range(count) if spec.points is None else spec.points

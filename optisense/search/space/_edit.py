@@ -25,11 +25,7 @@ class Edit:
     """Positions of some values of a design, which are set together."""
 
     def __init__(self, design: SensorDesign, paths: Sequence[str]) -> None:
-        """Look up all paths.
-
-        Raises:
-            DesignError: a path names nothing in the design; the message suggests a similar name.
-        """
+        """Look up all paths; DesignError if one names nothing in the design."""
         self.paths = tuple(paths)
         self._root: Node = {}
         for number, path in enumerate(paths):
@@ -45,12 +41,9 @@ class Edit:
             node[_key(value, last)] = number
 
     def apply(self, design: SensorDesign, values: Sequence[Any]) -> SensorDesign:
-        """Return a design with these values, one for each path; it is unchecked and shares
-        everything else.
-
-        Args:
-            design: design of the same structure as the one in which the paths were looked up.
-            values: plain Python values (no NumPy scalars).
+        """Return a design with these plain Python values, one for each path. It is unchecked, and
+        shares everything else with the given design, which has the structure of that of the
+        look-up.
         """
         if not self._root:
             return design

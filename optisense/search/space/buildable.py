@@ -57,11 +57,8 @@ class PartsInContact:
     """
 
     def __init__(self, design: SensorDesign, moved: Collection[str]) -> None:
-        """Find the contacts in the design that the search starts from.
-
-        Args:
-            design: design that the search starts from.
-            moved: names of the parts that are shifted or turned.
+        """Find the contacts of parts that move with others in the design that the search starts
+        from.
         """
         self._meshes = design.deformed_meshes()
         self._pairs = [
@@ -156,12 +153,7 @@ class LightsOnSupports:
     """
 
     def __init__(self, design: SensorDesign, moved: Collection[str]) -> None:
-        """Find the lights on opaque parts in the design that the search starts from.
-
-        Args:
-            design: design that the search starts from.
-            moved: names of the parts that are shifted or turned.
-        """
+        """Find the lights on opaque parts that move, in the design that the search starts from."""
         meshes = design.deformed_meshes()
         opaque = (Role.BLOCKER, Role.MIRROR)
         self._carried = {

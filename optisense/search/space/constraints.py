@@ -98,12 +98,7 @@ class NoNewProblems:
     def __init__(
         self, design: SensorDesign, problems: Callable[[SensorDesign], Sequence[Diagnostic]]
     ) -> None:
-        """Find the problems of the design that the search starts from, which are ignored.
-
-        Args:
-            design: design that the search starts from.
-            problems: function that returns the problems of a design.
-        """
+        """Find the problems of the design that the search starts from, which are ignored."""
         self._problems = problems
         self._always = {problem.where for problem in problems(design)}
 

@@ -231,10 +231,8 @@ class BoundSpace:
         return kind.options[place] if isinstance(kind, Choice) else place
 
     def _plan(self) -> None:
-        """Look up all paths once, so that applying a point is fast.
-
-        Options are values that users wrote: they are set with a check, which converts them to the
-        type of their field.
+        """Look up all paths once, so that applying a point is fast. Options, which users wrote, are
+        set with a check that converts them to the type of their field.
         """
         paths: list[str] = []
         source: list[int] = []
@@ -278,11 +276,7 @@ class BoundSpace:
                     )
 
     def _try_bounds(self) -> None:
-        """Set each bound and option once, so that an invalid one is reported before the search.
-
-        Raises:
-            OptiSenseError: a bound does not fit; the message names the parameter.
-        """
+        """Set each bound and option once, so that an invalid one is reported before the search."""
         for number, parameter in enumerate(self.parameters):
             if parameter.targets and parameter.name.startswith("cages."):
                 continue
@@ -336,7 +330,5 @@ def _meaning(parameter: Parameter, coordinate: float) -> float | int | str:
 
 
 def _may_nest(path: str) -> bool:
-    """Return whether single numbers may vary within the object at a path: a whole coating or camera
-    of the library.
-    """
+    """Return whether numbers may vary within the object at a path: a whole coating or camera."""
     return path.endswith((".library", ".model", ".material"))

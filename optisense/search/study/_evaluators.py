@@ -13,13 +13,7 @@ from optisense.search.study.study import Study
 
 def evaluators(study: Study, usual: DesignEvaluator, method: Method) -> tuple[Evaluator, Evaluator]:
     """Return the evaluator of a study's trials, and that of full scores, which is the same unless
-    trials have coarse scores.
-
-    Args:
-        usual: evaluator of plain scores.
-
-    Raises:
-        SearchError: the study has manufacturing errors, which the method can't apply.
+    trials have coarse scores. The method may replace `usual`, the evaluator of plain scores.
     """
     own = method.evaluator(usual)
     if own is usual and study.settings.errors is None and can_relight(usual):

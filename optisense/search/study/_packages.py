@@ -23,21 +23,10 @@ from optisense.search.study.settings import ONLY_HERE, StudySettings
 def packages_of(
     objectives: Sequence[str], requirements: Sequence[str], method: str, space: BoundSpace
 ) -> dict[str, dict[str, str]]:
-    """Return the installed packages of the objectives, the method and the kinds of a search.
-
-    Kinds are those of the design that the search starts from, and those that a choice has as an
-    option.
-
-    Args:
-        objectives: references to the objectives, as in `StudySettings`.
-        requirements: conditions as texts.
-
-    Returns:
-        Package, version and SHA-256 of the module (`Registry.origin`) of each object that comes
-        from an entry point, by its noun and name, such as "search method 'halving'".
-
-    Raises:
-        OptiSenseError: one of them can't be loaded.
+    """Return the installed packages of the objectives, the method and the kinds of a search: those
+    of the design that it starts from, and those that a choice has as an option. Package, version
+    and SHA-256 of the module (`Registry.origin`) of each object from an entry point have its noun
+    and name as their key, such as "search method 'halving'".
     """
     texts = [each for each in objectives if not each.startswith(ONLY_HERE)]
     texts += [each.quantity for each in requirements_of(requirements)]
@@ -70,9 +59,7 @@ def _designs(space: BoundSpace) -> Iterator[SensorDesign]:
 
 def refuse_other_packages(settings: StudySettings, space: BoundSpace) -> None:
     """Raise SearchError if an objective, the method or a kind was of another package, or its module
-    another one, when the trials of a study were scored.
-
-    Studies of releases that stored no packages are not checked.
+    another one, when the trials were scored. Studies that stored no packages are not checked.
     """
     then = settings.packages
     if not then:

@@ -43,16 +43,8 @@ design, so that only the better one is promoted: the last trials of CMA-ES are n
 
 
 def promote(study: Study, work: Work) -> None:
-    """Give the start and the promising trials of a study full scores with fresh seeds.
-
-    The start gets one full score, and further ones only if chance may be why it is worse than the
-    trial that leads.
-
-    Scores that exist are kept, so that a study that was stopped meanwhile continues.
-
-    Args:
-        study: study whose trials have coarse scores.
-        work: function that scores trials in full.
+    """Give the start and the promising trials of a study full scores with fresh seeds. The start
+    gets one, and further ones only if chance may be why it is worse than the trial that leads.
     """
     seeds = fresh_seeds(study.settings.seed)
     trials = study.trials
@@ -77,9 +69,7 @@ def promote(study: Study, work: Work) -> None:
 
 
 def _may_be_as_good(trial: Trial, leader: Trial) -> bool:
-    """Return whether chance may be why a trial with one full score is worse than the leader, whose
-    scores tell by how much two scores of a design differ.
-    """
+    """Return whether chance may be why a trial with one full score is worse than the leader."""
     chance = DEVIATIONS * math.sqrt(2.0) * leader.fresh_spread()
     return trial.fresh_score() > leader.fresh_score() - chance
 

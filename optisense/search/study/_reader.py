@@ -35,11 +35,7 @@ class Reader:
 
     @contextmanager
     def connected(self) -> Iterator[sqlite3.Connection]:
-        """Yield a connection for the duration of the block.
-
-        Raises:
-            sqlite3.Error, OSError: the file can't be read.
-        """
+        """Yield a connection for the duration of the block."""
         while (stamp := self._stamp())[2] == 0:
             if self._memory is not None and self._memory[0] == stamp:
                 yield self._memory[1]
@@ -60,10 +56,7 @@ class Reader:
             yield live
 
     def _stamp(self) -> Stamp:
-        """Return the state of the file.
-
-        Raises: OSError: the file does not exist.
-        """
+        """Return the state of the file."""
         found = self._path.stat()
         try:
             log = self._log.stat().st_size

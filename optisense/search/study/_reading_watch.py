@@ -32,11 +32,7 @@ class ReadingWatch:
     """Reads the start and the best design so far of a study, and stores that with their trials."""
 
     def __init__(self, study: Study, tally: Tally, usual: DesignEvaluator) -> None:
-        """Store the study; nothing is read yet.
-
-        Args:
-            usual: evaluator of plain scores.
-        """
+        """Store the study and its evaluator of plain scores; nothing is read yet."""
         self._study, self._tally, self._usual = study, tally, usual
         texts = [goal for goal in usual.goals if isinstance(goal, str)]
         texts += [each.quantity for each in usual.requirements]
@@ -46,10 +42,8 @@ class ReadingWatch:
         self._reader: DesignEvaluator | None = None
 
     def update(self, *, last: bool = False) -> None:
-        """Read the start and the best design, if it is time to and they were not read before.
-
-        Args:
-            last: whether the trials have ended, so that a long search is read in any case.
+        """Read the start and the best design, if they were not read before and it is time to, or if
+        the trials have ended and the search was long.
         """
         now = time.monotonic()
         due = self._began + FIRST_SECONDS if last else self._due

@@ -45,11 +45,7 @@ class Tally:
         self._reasons: dict[str, list[str]] = {}
 
     def count(self, row: Row, outcome: Outcome) -> None:
-        """Count a finished trial, and stop a study in which every trial fails.
-
-        Raises:
-            SearchError: the first trials all failed; the message says why.
-        """
+        """Count a finished trial; SearchError if the first trials all failed."""
         score = outcome.scores.get(self._objective, math.nan)
         if row.generation == START:
             self.start, self._start_outcome = score, outcome

@@ -115,11 +115,7 @@ class Plan:
         )
 
     def _samples(self) -> int:
-        """Return the number of manufactured sensors per trial; 0 without manufacturing errors.
-
-        Raises:
-            SearchError: the number is given without manufacturing errors.
-        """
+        """Return the number of manufactured sensors per trial; 0 without manufacturing errors."""
         if self.errors is not None:
             return SAMPLES if self.samples is None else self.samples
         if self.samples is not None:

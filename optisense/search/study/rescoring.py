@@ -82,9 +82,7 @@ def scored(trials: Sequence[Trial], seeds: Sequence[int], work: Work, more: int 
 
 
 def _score(trials: Sequence[Trial], seeds: Sequence[int], work: Work) -> list[Trial]:
-    """Return the trials with their scores by fresh seeds; one seed suffices if seeds do not
-    matter.
-    """
+    """Return the trials with scores by fresh seeds, or by one of them if seeds do not matter."""
     first = scored(trials, seeds[:1], work, more=len(trials) * (len(seeds) - 1))
     noisy = [each for each in first if not _alike(each.fresh[seeds[0]], each.outcome)]
     known = {each.number: each for each in scored(noisy, seeds[1:], work)}

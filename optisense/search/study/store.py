@@ -378,11 +378,7 @@ def _has_conditions(db: sqlite3.Connection) -> bool:
 
 
 def _objects(parts: Any) -> dict[str, Any]:
-    """Return the parts of scores that were read from JSON, after a check.
-
-    Raises:
-        TypeError: `parts` is not a dictionary of dictionaries.
-    """
+    """Return the parts of scores that were read from JSON; TypeError if they have another form."""
     if not isinstance(parts, dict) or not all(isinstance(each, dict) for each in parts.values()):
         raise TypeError("the parts of its scores are no objects")
     for value in parts.get(CONDITIONS, {}).values():

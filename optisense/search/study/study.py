@@ -328,14 +328,8 @@ class Study:
 
     @property
     def _judged(self) -> float:
-        """Number of trials that were considered when the best were last scored with fresh seeds.
-
-        It is one of three:
-            the stored number, once a run has scored the best;
-            0, if the study does not store it and has not ended or was interrupted: no trial was
-            considered;
-            infinity, if the study does not store it and has ended, in a release that did not store
-            it: all trials were considered.
+        """Number of trials that were considered when the best were last scored with fresh seeds: 0
+        if they never were, and infinity in a study that ended in a release that did not store it.
         """
         found = self.store.fact(JUDGED)
         if isinstance(found, int):
@@ -406,11 +400,8 @@ def beside(study: Study, trial: Trial) -> dict[str, float]:
 
 
 def _shown(name: str, *, rays_only: bool) -> tuple[str, ...]:
-    """Return the parts that an objective lists to be shown with its value; none for a user's
-    objective, whose file is not run to look at a study.
-
-    Args:
-        rays_only: whether objectives that need images have none.
+    """Return the parts that an objective lists to be shown with its value, or with `rays_only` none
+    if it needs images; none for a user's objective, whose file is not run to look at a study.
     """
     from optisense.objectives.combined import objective_of
     from optisense.objectives.named import is_plain

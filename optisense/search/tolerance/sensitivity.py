@@ -102,11 +102,9 @@ def total_effect(scores: ArrayLike, source: int) -> Estimate | None:
 
 
 def _within_bounds(share: Estimate) -> Estimate:
-    """Return a share clipped to at most 1.
-
-    The formula can give 1.65 where a share is near 1 and sensors are few. The true share is never
-    above 1, so clipping never increases the error of the estimate or of an end of its interval. The
-    standard error is that of the unclipped estimate.
+    """Return a share clipped to at most 1. Jansen's formula can give 1.65 where a share is near 1
+    and sensors are few; clipping brings every estimate nearer to the truth. The standard error is
+    that of the unclipped estimate.
     """
     value, low, high = (min(1.0, each) for each in (share.value, share.low, share.high))
     return Estimate(value, low, high, share.error)
@@ -114,10 +112,8 @@ def _within_bounds(share: Estimate) -> Estimate:
 
 def _share(values: FloatArray, source: int) -> float:
     """Return the unclipped share of one source in the variance of scores (rows, 1 + sources).
-
-    The quotient of two estimates is biased even if both are not. Shares of a linear score are too
-    large by 7 % of themselves with 8 rows, 3 % with 16 and 1 % with 64, which is a seventh of their
-    standard errors or less. With rows - 1 in the variance they would be too small by as much.
+    Shares of a linear score are too large by 7 % of themselves with 8 rows and 1 % with 64, a
+    seventh of their standard errors or less.
     """
     apart = values[:, 0] - values[:, 1 + source]
     apart = apart[np.isfinite(apart)]
