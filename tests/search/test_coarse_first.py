@@ -14,9 +14,9 @@ from optisense.search import SearchResult, Study, run_study, search
 from optisense.search.evaluation.coarse import CONTACT_PIXELS, CoarseEvaluator, coarse_settings
 from optisense.search.evaluation.evaluator import DesignEvaluator
 from optisense.search.space.search_space import SearchSpace
-from optisense.search.study._promotion import LEAST_PROMOTED
 from optisense.search.study.plan import Plan
 from optisense.search.study.progress import FRESH, SearchProgress
+from optisense.search.study.rescoring import LEAST_PROMOTED
 from optisense.search.study.study import beside
 
 FULL = {"resolution": [640, 480], "photons": 1_000_000}

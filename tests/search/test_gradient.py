@@ -14,7 +14,6 @@ from optisense.array_types import FloatArray
 from optisense.errors import NoDerivativeError, SearchError
 from optisense.search import Around, CagePoints, SearchSpace, search
 from optisense.search.evaluation.evaluator import DesignEvaluator
-from optisense.search.methods._gradient_sources import GradientSource
 from optisense.search.methods.base import Problem
 from optisense.search.methods.checked_gradients import (
     FEW_PARAMETERS,
@@ -24,7 +23,7 @@ from optisense.search.methods.checked_gradients import (
     GradientEvaluator,
 )
 from optisense.search.methods.gradient import Gradient
-from optisense.search.methods.score_differences import ScoreDifferences
+from optisense.search.methods.score_differences import GradientSource, ScoreDifferences
 from optisense.sensors import gelsight_svelte
 
 SETTINGS = {"ray_resolution": (160, 120)}

@@ -20,7 +20,7 @@ from optisense.objectives.registry import OBJECTIVES
 from optisense.search import Choice, Study, search
 from optisense.search._run_search import run_study
 from optisense.search.methods import METHODS
-from optisense.search.study._definitions import SCORING
+from optisense.search.study._same_scoring import SCORING
 from optisense.search.study.store import START, STORE_VERSION
 
 SPACE = {"coating.specularity": (0.0, 1.0, 5), "camera.position.x": (-1.0, 3.0, 3)}

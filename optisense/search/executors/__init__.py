@@ -7,8 +7,7 @@ from typing import cast
 
 from optisense.search.evaluation.evaluator import Evaluator
 from optisense.search.executors._remote import DaskRunner, ExecutorRunner
-from optisense.search.executors._serial import SerialRunner
-from optisense.search.executors.base import Runner
+from optisense.search.executors.base import Runner, SerialRunner
 from optisense.search.executors.pool import ProcessPool, processors
 
 __all__ = [

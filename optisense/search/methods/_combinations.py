@@ -1,7 +1,8 @@
-"""Base of methods over combinations of a few levels: enumeration, and hill climbing."""
+"""Methods over combinations of a few levels: the grid, and the base of hill climbs."""
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
 from itertools import islice, product
@@ -126,6 +127,31 @@ class Combinations(Method):
         for place in self._random.choice(count, size=most, replace=False).tolist():
             shaken[place] = int(self._random.integers(len(self.levels[place])))
         return tuple(shaken)
+
+
+class Grid(Combinations):
+    """Search over all combinations; the last parameter changes fastest."""
+
+    name = "grid"
+    summary = "every combination of steps and options"
+    accepts_coarse_scores = True
+
+    def __init__(self, problem: Problem) -> None:
+        super().__init__(problem, levels_of(problem.space))
+        if problem.budget < self.size:
+            raise SearchError(
+                f"the grid has {self.size:,} designs, the budget is {problem.budget:,}",
+                hint="Leave --budget out, take fewer steps, or use another method",
+            )
+
+    @classmethod
+    def default_budget(cls, space: BoundSpace) -> int:
+        """Return the number of all combinations."""
+        return math.prod(len(levels) for levels in levels_of(space))
+
+    def plan(self) -> Iterator[Stage]:
+        """See `Combinations.plan`."""
+        return self.everything("every combination")
 
 
 def changed(combination: Combination, members: Sequence[int], level: int) -> Combination:

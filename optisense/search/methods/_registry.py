@@ -34,7 +34,7 @@ METHODS: Registry[type[Method]] = Registry(
     "optisense.methods",
     SearchError,
     {
-        "grid": "optisense.search.methods._grid:Grid",
+        "grid": "optisense.search.methods._combinations:Grid",
         "random": "optisense.search.methods._random_search:Random",
         "cma-es": "optisense.search.methods._cma_es:CmaEs",
         "gradient": "optisense.search.methods.gradient:Gradient",

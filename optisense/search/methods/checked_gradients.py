@@ -24,10 +24,9 @@ from optisense.design import SensorDesign
 from optisense.errors import NoDerivativeError, OptiSenseError
 from optisense.search.evaluation.evaluator import DesignEvaluator
 from optisense.search.evaluation.outcome import Outcome
-from optisense.search.methods._gradient_sources import GradientSource
 from optisense.search.methods._jacobian import Jacobian, jacobian, predicts
 from optisense.search.methods._smooth_scores import SmoothScore
-from optisense.search.methods.score_differences import STEP, ScoreDifferences
+from optisense.search.methods.score_differences import STEP, GradientSource, ScoreDifferences
 from optisense.search.space.pickling import PickledWithoutCaches
 
 if TYPE_CHECKING:

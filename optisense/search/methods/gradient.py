@@ -44,13 +44,6 @@ from optisense.search.methods._augmented_lagrangian import (
     AugmentedLagrangian,
 )
 from optisense.search.methods._feasible import FeasiblePoint, FeasibleRegion
-from optisense.search.methods._gradient_sources import (
-    GradientSource,
-    LocalValues,
-    PointsWantedError,
-    TrialDifferences,
-    source_of,
-)
 from optisense.search.methods.base import Method, Problem
 from optisense.search.methods.checked_gradients import (
     FEW_PARAMETERS,
@@ -61,7 +54,14 @@ from optisense.search.methods.checked_gradients import (
     TOLERANCE,
     GradientEvaluator,
 )
-from optisense.search.methods.score_differences import STEP
+from optisense.search.methods.score_differences import (
+    STEP,
+    GradientSource,
+    LocalValues,
+    PointsWantedError,
+    TrialDifferences,
+    source_of,
+)
 from optisense.search.space.search_space import BoundSpace
 
 DEFAULT_STEPS = 12

@@ -1,15 +1,23 @@
-"""Derivatives of true scores by central differences."""
+"""Sources of the gradient of a search, and gradients by differences of scores."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from enum import Enum
+from typing import NamedTuple
 
 import numpy as np
 
 from optisense.array_types import FloatArray
 from optisense.design import SensorDesign
-from optisense.errors import ObjectiveError, OptiSenseError
-from optisense.search.evaluation.evaluator import DesignEvaluator
+from optisense.errors import ObjectiveError, OptiSenseError, SearchError
+from optisense.objectives.named import are_rays_only
+from optisense.search.evaluation.evaluator import RELIGHTS, DesignEvaluator
+from optisense.search.evaluation.outcome import Outcome
+from optisense.search.evaluation.requirements import Requirement
+from optisense.search.methods._jacobian import moving_parts
+from optisense.search.methods._smooth_scores import SmoothScore
+from optisense.search.methods.base import Problem
 from optisense.search.space.search_space import BoundSpace
 
 STEP = 0.05
@@ -18,6 +26,108 @@ A true score is a sum over pixels and triangles, which jumps where a row of pixe
 and has small hills where an edge passes the picture's corner: over shorter steps a difference says
 little about the direction of ascent. Checks also use half of this step.
 """
+
+
+class GradientSource(Enum):
+    """A source of gradients, with its name in outcomes."""
+
+    RAYS = "derivatives of rays"
+    LAYERS = "differences of scores of relit pictures"
+    DIFFERENCES = "differences of scores"
+    TRIALS = "differences of trials"
+
+
+class LocalValues(NamedTuple):
+    """Values and gradients at a point: values (1 + m,) of the score and the limited quantities, and
+    their gradients (1 + m, n) by units of the ranges.
+    """
+
+    values: FloatArray
+    gradients: FloatArray
+
+
+class PointsWantedError(Exception):
+    """Signal that ends a run of the optimiser at points (k, n) that have no score yet."""
+
+    def __init__(self, points: FloatArray) -> None:
+        super().__init__()
+        self.points = points
+
+
+def source_of(problem: Problem) -> tuple[GradientSource, list[str]]:
+    """Return the source of the gradients for a problem, and for derivatives of rays also the parts
+    that points move; SearchError if a parameter has no gradient.
+    """
+    space, objective = problem.space, problem.objectives[0]
+    for number in np.flatnonzero(space.discrete):
+        raise SearchError(
+            "a choice or a whole number has no gradient",
+            where=space.names[number],
+            hint="Search it with --method grid, or vary it with cma-es",
+        )
+    try:
+        rays_only = are_rays_only([objective])
+    except ObjectiveError:  # a function of the caller's program
+        return GradientSource.TRIALS, []
+    if not rays_only:
+        relit = all(RELIGHTS.search(name) for name in space.names)
+        return (GradientSource.LAYERS if relit else GradientSource.TRIALS), []
+    if SmoothScore.of(objective) is None:
+        return GradientSource.TRIALS, []
+    return GradientSource.RAYS, moving_parts(space)
+
+
+class TrialDifferences:
+    """Central differences of trials over `STEP` of the ranges, or as far as the bounds allow."""
+
+    def __init__(self, problem: Problem, requirements: Sequence[Requirement]) -> None:
+        """Store what is differentiated: the first objective, and what conditions limit."""
+        self._space, self._objective = problem.space, problem.objectives[0]
+        self._span = problem.space.upper - problem.space.lower
+        self._requirements = requirements
+
+    def around(self, point: FloatArray, known: Mapping[bytes, Outcome]) -> LocalValues | None:
+        """Return values and gradients at a point (n,), or None if it has no score;
+        PointsWantedError if points must be scored first. If the trial on one side failed, the
+        difference is one-sided.
+        """
+        sides = self._beside(point)
+        wanted = [each for each in (point, *sides) if each.tobytes() not in known]
+        if wanted:
+            raise PointsWantedError(np.array(wanted))
+        values = self._exact(known[point.tobytes()])
+        if values is None:
+            return None
+        gradients = np.zeros((len(values), self._space.size))
+        for number, span in enumerate(self._span):
+            ends = []
+            for side in sides[2 * number : 2 * number + 2]:
+                exact = self._exact(known[side.tobytes()])
+                place = (side[number] - point[number]) / span
+                ends.append((0.0, values) if exact is None else (place, exact))
+            (high, above), (low, below) = ends
+            if high > low:
+                gradients[:, number] = (above - below) / (high - low)
+        return LocalValues(values, gradients)
+
+    def _beside(self, point: FloatArray) -> list[FloatArray]:
+        """Return two points (n,) for each parameter, above and below, within the bounds."""
+        found = []
+        for number, span in enumerate(self._span):
+            low, high = self._space.lower[number], self._space.upper[number]
+            for way in (STEP, -STEP):
+                side = point.copy()
+                side[number] = np.clip(point[number] + way * span, low, high)
+                found.append(side)
+        return found
+
+    def _exact(self, outcome: Outcome) -> FloatArray | None:
+        """Return the score and the limited quantities, (1 + m,), or None if one is missing."""
+        limited = [outcome.conditions.get(str(each)) for each in self._requirements]
+        values = [outcome.scores.get(self._objective, np.nan), *limited]
+        if any(value is None or not np.isfinite(value) for value in values):
+            return None
+        return np.array(values, dtype=np.float64)
 
 
 class ScoreDifferences:

@@ -18,10 +18,9 @@ from optisense.search.evaluation.outcome import Outcome
 from optisense.search.executors import Runner
 from optisense.search.executors.base import TICK, run_jobs
 from optisense.search.methods import Method, Problem, make
-from optisense.search.study._definitions import SCORING, refuse_other_definitions
 from optisense.search.study._evaluators import evaluators
-from optisense.search.study._promotion import promote
 from optisense.search.study._reading_watch import ReadingWatch
+from optisense.search.study._same_scoring import SCORING, refuse_other_definitions
 from optisense.search.study._tally import Tally
 from optisense.search.study.advice import moved_start_note
 from optisense.search.study.best import newer_note, tie_note
@@ -34,7 +33,7 @@ from optisense.search.study.progress import (
     SearchProgressCallback,
     SearchResult,
 )
-from optisense.search.study.rescoring import rescore
+from optisense.search.study.rescoring import promote, rescore
 from optisense.search.study.settings import package_versions
 from optisense.search.study.store import START, Row
 from optisense.search.study.study import BUDGET, JUDGED, Study

@@ -22,8 +22,7 @@ from optisense.search.methods import names as method_names
 from optisense.search.space.constraints import Constraint, UserRule
 from optisense.search.space.manufacturing import SAMPLES, ManufacturingErrors
 from optisense.search.space.search_space import SearchSpace
-from optisense.search.study._definitions import SCORING
-from optisense.search.study._packages import packages_of
+from optisense.search.study._same_scoring import SCORING, packages_of
 from optisense.search.study.settings import ONLY_HERE, StudySettings
 from optisense.untrusted_files import MOST_PROGRAM, read_bytes
 

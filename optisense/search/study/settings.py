@@ -38,7 +38,7 @@ out of comparisons if they have their defaults, so that such studies can be resu
 
 OPTIONAL = (*LATER, "scoring")
 """Names that may be missing in `STUDY_FILE`. New studies always have a version of the scoring; a
-study of another version is resumed if its scores are the same (`_definitions`).
+study of another version is resumed if its scores are the same (`_same_scoring`).
 """
 
 Names = Annotated[list[str], Field(max_length=MOST_NAMES)]
@@ -66,12 +66,12 @@ class StudySettings:
         rules: constraints as FILE.py:FUNCTION, or "function:NAME".
         files: SHA-256 of each user's file with objectives or rules, by path.
         packages: installed packages of objectives, the method and kinds
-            (`optisense.search.study._packages`); empty also if they were not stored yet.
+            (`optisense.search.study._same_scoring`); empty also if they were not stored yet.
         errors: manufacturing errors, as from `ManufacturingErrors.to_plain`, for P10; else None.
         samples: number of manufactured sensors per trial.
         requirements: conditions that the best trial must meet.
         coarse_first: whether trials have coarse scores, and only the promising ones full scores.
-        scoring: version of the definitions of the scores (`optisense.search.study._definitions`);
+        scoring: version of the definitions of the scores (`optisense.search.study._same_scoring`);
             0 if it was not stored yet.
         begun: time of creation, UTC.
         versions: versions of the packages with which the study was begun.

@@ -24,8 +24,7 @@ from optisense.array_types import FloatArray
 from optisense.errors import OutputError, SearchError
 from optisense.objectives.registry import CONDITIONS
 from optisense.search.evaluation.outcome import Outcome
-from optisense.search.study._reader import Reader
-from optisense.search.study._store_errors import damaged, translated_errors
+from optisense.search.study._reader import Reader, damaged, translated_errors
 from optisense.untrusted_files import MOST_STORE, check_size
 
 STORE_VERSION = 1

@@ -26,7 +26,7 @@ from optisense.library import with_own_lights
 from optisense.search.evaluation.evaluator import DesignEvaluator, Goal
 from optisense.search.space.constraints import Constraint
 from optisense.search.space.search_space import BoundSpace, SearchSpace
-from optisense.search.study._packages import refuse_other_packages
+from optisense.search.study._same_scoring import refuse_other_packages
 from optisense.search.study.best import best_of, front_among, nearest, start_of
 from optisense.search.study.folder import (
     STORE_FILE,
