@@ -29,7 +29,7 @@ from optisense.cli.options import (
 )
 from optisense.cli.search_result import print_result, summary
 from optisense.cli.searching import search_progress
-from optisense.commands.searching import SearchOptions
+from optisense.commands.scoring import SearchOptions
 from optisense.errors import OptiSenseError
 from optisense.text import argument
 

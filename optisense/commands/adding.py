@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
+from annotated_types import Ge, Le
 from pydantic import AfterValidator, BeforeValidator, Field
 
 from optisense.commands.options import CommandOptions, OptionNotation
@@ -18,28 +19,14 @@ COOLEST, HOTTEST = 1000.0, 20_000.0
 
 
 def above_0(value: float) -> float:
-    """Return a number.
-
-    Raises:
-        ValueError: it is not above 0 and finite.
-    """
+    """Return a number; ValueError if it is not above 0 and finite."""
     if not 0.0 < value < float("inf"):
         raise ValueError(f"{value:g} is not above 0")
     return value
 
 
-def _wavelength(value: float) -> float:
-    low, high = WAVELENGTHS
-    if not low <= value <= high:
-        raise ValueError(f"{value:g} is no wavelength of a light in nm, from {low:g} to {high:g}")
-    return value
-
-
 def lengths(count: int) -> BeforeValidator:
-    """Return a validator that parses lengths in mm such as 2.8x3.5x1.9.
-
-    It raises a ValueError for other texts.
-    """
+    """Return a validator that parses lengths in mm such as 2.8x3.5x1.9."""
 
     def read(value: Any) -> Any:
         if not isinstance(value, str):
@@ -54,14 +41,6 @@ def lengths(count: int) -> BeforeValidator:
         return found
 
     return BeforeValidator(read)
-
-
-def _status(value: Any) -> Status:
-    try:
-        return Status(value)
-    except ValueError:
-        known = ", ".join(status.value for status in Status)
-        raise ValueError(f"'{value}' is none of {known}") from None
 
 
 def _kelvin(value: float) -> float:
@@ -82,9 +61,9 @@ class IesOptions(CommandOptions):
     flux: Annotated[Above0, OptionNotation("MW")] | None = Field(
         None, description="With an .ies: radiant flux in mW."
     )
-    wavelength: Annotated[float, AfterValidator(_wavelength), OptionNotation("NM")] | None = Field(
-        None, description="With an .ies: dominant wavelength in nm."
-    )
+    wavelength: (
+        Annotated[float, Ge(WAVELENGTHS[0]), Le(WAVELENGTHS[1]), OptionNotation("NM")] | None
+    ) = Field(None, description="With an .ies: dominant wavelength in nm.")
     current: Annotated[Above0, OptionNotation("MA")] | None = Field(
         None, description="With an .ies: current in mA at this flux."
     )
@@ -98,11 +77,9 @@ class IesOptions(CommandOptions):
     source: Annotated[str, OptionNotation("TEXT")] | None = Field(
         None, description="With an .ies: where these numbers are from."
     )
-    status: Annotated[Status, BeforeValidator(_status), OptionNotation("STATUS", is_text=True)] = (
-        Field(
-            Status.ASSUMED,
-            description="With an .ies: measured, datasheet, sourced, derived or assumed.",
-        )
+    status: Annotated[Status, OptionNotation("STATUS", is_text=True)] = Field(
+        Status.ASSUMED,
+        description="With an .ies: measured, datasheet, sourced, derived or assumed.",
     )
 
 

@@ -1,4 +1,6 @@
-"""Building blocks of option models, and parsers of values that users write as text."""
+"""Building blocks of option models, and parsers of values that users write as text; a ValueError
+tells which form a text should have.
+"""
 
 from __future__ import annotations
 
@@ -51,11 +53,7 @@ class OptionNotation:
 
 
 def read_resolution(value: Any) -> Any:
-    """Return width and height in pixels, from a pair of numbers or WIDTHxHEIGHT.
-
-    Raises:
-        ValueError: the text has another form, or there are too many pixels.
-    """
+    """Return width and height in pixels, from a pair of numbers or WIDTHxHEIGHT."""
     if not isinstance(value, str):
         return value
     match = re.fullmatch(r"\s*([0-9]{1,6})\s*[xX×]\s*([0-9]{1,6})\s*", value)
@@ -68,11 +66,7 @@ def read_resolution(value: Any) -> Any:
 
 
 def read_exposure(value: Any) -> float | Literal["auto"]:
-    """Return a positive factor, or "auto".
-
-    Raises:
-        ValueError: the value is neither.
-    """
+    """Return a positive factor, or "auto"."""
     if isinstance(value, str) and value.strip().lower() == "auto":
         return "auto"
     try:
@@ -87,11 +81,7 @@ def read_exposure(value: Any) -> float | Literal["auto"]:
 
 
 def read_range(value: Any) -> Any:
-    """Return two numbers, from a pair, LOW:HIGH or one number.
-
-    Raises:
-        ValueError: the text has another form.
-    """
+    """Return two numbers, from a pair, LOW:HIGH or one number."""
     if not isinstance(value, str):
         return value
     low, _, high = value.partition(":")
@@ -105,12 +95,8 @@ def read_range(value: Any) -> Any:
 
 
 def read_named(value: Any) -> Any:
-    """Return values by name, from a mapping or NAME=VALUE texts.
-
-    Values are parsed as in a design file: 1e-3 is a number.
-
-    Raises:
-        ValueError: a text has another form, or two have the same name.
+    """Return values by name, from a mapping or NAME=VALUE texts, whose values are parsed as in a
+    design file: 1e-3 is a number.
     """
     if not isinstance(value, list):
         return value
@@ -134,10 +120,7 @@ def read_named(value: Any) -> Any:
 
 
 def one_of(names: Collection[str]) -> Callable[[str], str]:
-    """Return a validator that accepts one of several names.
-
-    It raises a ValueError for any other.
-    """
+    """Return a validator that accepts one of several names."""
 
     def check(value: str) -> str:
         if value not in names:

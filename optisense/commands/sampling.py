@@ -219,11 +219,7 @@ class VerifyOptions(CommandOptions):
         return self._presses() + objects * self._places()
 
     def settings(self) -> Any:
-        """Return the settings of `optisense.tasks.verify`, which takes a second to load.
-
-        Raises:
-            TaskError: a setting is invalid.
-        """
+        """Return the settings of `optisense.tasks.verify`, which takes a second to load."""
         from optisense.tasks import ReconstructionSettings, VerificationSettings
 
         reading = ReconstructionSettings(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import Field
 
-from optisense.commands.searching import SearchOptions
+from optisense.commands.scoring import SearchOptions
 from optisense.engine.designing import bent_shapes
 from optisense.engine.failures import ProtocolError
 from optisense.engine.following import Following, curve_row, trial_row

@@ -22,7 +22,7 @@ from optisense.commands.options import (
     Resolution,
 )
 from optisense.commands.rendering import RenderOptions
-from optisense.commands.searching import SearchOptions
+from optisense.commands.scoring import SearchOptions
 from optisense.engine.requests import find
 from optisense.quality import PHOTONS
 

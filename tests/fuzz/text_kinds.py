@@ -15,7 +15,7 @@ import optisense as ots
 import optisense.commands.comparing
 import optisense.commands.rendering
 import optisense.commands.sampling
-import optisense.commands.searching
+import optisense.commands.scoring
 from optisense.cli.from_options import options_of
 from optisense.commands.options import CommandOptions
 from optisense.geometry import parse_contact
