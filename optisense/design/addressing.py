@@ -71,8 +71,8 @@ def set_values(design: SensorDesign, values: Mapping[str, object]) -> SensorDesi
         target: Any = data
         *way, last = parse_path(path)
         for step in way:
-            target = target[_key(target, step)]
-        plain, key = _plain(value), _key(target, last)
+            target = target[key_of(target, step)]
+        plain, key = _plain(value), key_of(target, last)
         if path in models and target[key] != plain:
             target.update(of_model(str(plain)))
         target[key] = plain
@@ -141,7 +141,7 @@ def _child(value: Any, step: str | int, path: str, done: Steps) -> Any:
             return value[step]
         known = list(value)
     elif isinstance(value, list | tuple):
-        key = _key(value, step)
+        key = key_of(value, step)
         if isinstance(key, int):
             if key < len(value):
                 return value[key]
@@ -164,7 +164,7 @@ def _child(value: Any, step: str | int, path: str, done: Steps) -> Any:
     )
 
 
-def _key(container: Any, step: str | int) -> str | int:
+def key_of(container: Any, step: str | int) -> str | int:
     """Return the key or index of `step`; x, y, z and r, g, b stand for 0, 1, 2 in a triple."""
     if isinstance(container, list | tuple) and len(container) == 3 and step in _LETTERS:
         return _LETTERS[str(step)]

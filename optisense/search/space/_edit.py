@@ -1,8 +1,8 @@
 """Set many numbers of a design at once.
 
-`set_value` checks the whole design for each value; a cage of 27 control points has 81. Here the
-positions of all values are looked up once, and then only the containers on the way to them are
-rebuilt. Nothing is checked: the caller has tried the bounds, or checks the result.
+`set_value` checks the whole design for each value; a cage of 27 control points has 81. Here all
+paths are looked up once, and then only the containers on the way to the values are rebuilt. Nothing
+is checked: the caller has tried the bounds, or checks the result.
 """
 
 from __future__ import annotations
@@ -13,12 +13,10 @@ from typing import Any
 from pydantic import BaseModel
 
 from optisense.design import SensorDesign, get_value, parse_path
-
-_LETTERS = {"x": 0, "y": 1, "z": 2, "r": 0, "g": 1, "b": 2}
-"""Index of a coordinate or colour channel, by the letter that may stand for it in a path."""
+from optisense.design.addressing import key_of
 
 Node = dict[str | int, "Node | int"]
-"""Step down the design; a leaf is the index of a value in the given sequence."""
+"""Steps down the design; a leaf is the index of a value in the given sequence."""
 
 
 class Edit:
@@ -26,19 +24,16 @@ class Edit:
 
     def __init__(self, design: SensorDesign, paths: Sequence[str]) -> None:
         """Look up all paths; DesignError if one names nothing in the design."""
-        self.paths = tuple(paths)
         self._root: Node = {}
         for number, path in enumerate(paths):
             get_value(design, path)
-            node, value = self._root, design
+            node = self._root
             *way, last = parse_path(path)
             for step in way:
-                key = _key(value, step)
-                value = _child(value, key)
-                below = node.setdefault(key, {})
+                below = node.setdefault(step, {})
                 assert isinstance(below, dict), f"'{path}' lies inside another path"
                 node = below
-            node[_key(value, last)] = number
+            node[last] = number
 
     def apply(self, design: SensorDesign, values: Sequence[Any]) -> SensorDesign:
         """Return a design with these plain Python values, one for each path. It is unchecked, and
@@ -51,31 +46,17 @@ class Edit:
         return edited
 
 
-def _rebuilt(value: Any, node: Node, values: Sequence[Any]) -> Any:
-    """Return a copy of the containers on the way to the values; everything else is shared."""
+def _rebuilt(value: Any, node: Node | int, values: Sequence[Any]) -> Any:
+    """Return the value of a leaf, or a copy of a container with other values in it."""
+    if isinstance(node, int):
+        return values[node]
     if isinstance(value, BaseModel):
-        update = {str(step): _below(getattr(value, str(step)), node[step], values) for step in node}
-        return value.model_copy(update=update)
-    if isinstance(value, dict):
-        return {**value, **{step: _below(value[step], node[step], values) for step in node}}
-    items = list(value)
+        inner = {str(step): below for step, below in node.items()}
+        return value.model_copy(
+            update={name: _rebuilt(getattr(value, name), inner[name], values) for name in inner}
+        )
+    items: Any = dict(value) if isinstance(value, dict) else list(value)
     for step, below in node.items():
-        items[int(step)] = _below(items[int(step)], below, values)
+        key = key_of(value, step)
+        items[key] = _rebuilt(items[key], below, values)
     return tuple(items) if isinstance(value, tuple) else items
-
-
-def _below(value: Any, node: Node | int, values: Sequence[Any]) -> Any:
-    return values[node] if isinstance(node, int) else _rebuilt(value, node, values)
-
-
-def _key(container: Any, step: str | int) -> str | int:
-    """Return the index of a letter of `_LETTERS` in a sequence, else the step itself."""
-    if isinstance(container, list | tuple) and step in _LETTERS:
-        return _LETTERS[str(step)]
-    return step
-
-
-def _child(container: Any, step: str | int) -> Any:
-    if isinstance(container, BaseModel):
-        return getattr(container, str(step))
-    return container[step]
