@@ -75,8 +75,7 @@ class Combinations(Method):
 
     def everything(self, stage: str) -> Iterator[Stage]:
         """Yield all combinations; the last parameter changes fastest."""
-        everyone = product(*(range(len(each)) for each in self.levels))
-        while chunk := list(islice(everyone, GENERATION)):
+        for chunk in chunks(product(*(range(len(each)) for each in self.levels))):
             yield stage, chunk
 
     def climb(
@@ -152,6 +151,12 @@ class Grid(Combinations):
     def plan(self) -> Iterator[Stage]:
         """See `Combinations.plan`."""
         return self.everything("every combination")
+
+
+def chunks(combinations: Iterator[Combination]) -> Iterator[list[Combination]]:
+    """Yield combinations by `GENERATION`."""
+    while chunk := list(islice(combinations, GENERATION)):
+        yield chunk
 
 
 def changed(combination: Combination, members: Sequence[int], level: int) -> Combination:

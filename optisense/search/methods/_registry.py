@@ -39,8 +39,8 @@ METHODS: Registry[type[Method]] = Registry(
         "cma-es": "optisense.search.methods._cma_es:CmaEs",
         "gradient": "optisense.search.methods.gradient:Gradient",
         "pareto": "optisense.search.methods._pareto:Pareto",
-        "light-colours": "optisense.search.methods._light_colours:LightColours",
-        "types": "optisense.search.methods._light_types:LightTypes",
+        "light-colours": "optisense.search.methods._lights:LightColours",
+        "types": "optisense.search.methods._lights:LightTypes",
     },
     _check,
 )
