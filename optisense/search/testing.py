@@ -259,7 +259,7 @@ class MethodContract:
 
         for name, space in self.spaces().items():
             bound = SearchSpace(space).bind(self.design(), tried=False)
-            start = (bound.start - bound.lower) / (bound.upper - bound.lower)
+            start = bound.to_unit(bound.start)
             if self.objectives == 1:
                 assert self.run(space, only_start).best.is_start, name
 
@@ -282,7 +282,7 @@ class MethodContract:
         bound = SearchSpace(space).bind(self.design(), tried=False)  # a study tries the bounds
 
         def score(design: SensorDesign) -> float:
-            share = (self.coordinates(bound, design) - bound.lower) / (bound.upper - bound.lower)
+            share = bound.to_unit(self.coordinates(bound, design))
             return landscape(np.clip(1.0 - share if number else share, 0.0, 1.0))
 
         score.__name__ = f"score_{number}"

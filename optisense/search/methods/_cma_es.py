@@ -87,7 +87,7 @@ class CmaEs(Method):
         # pycma draws from NumPy's global generator, which gets a state of its own while pycma runs.
         self._state = np.random.RandomState(int(self._random.integers(2**32))).get_state()
         whole = problem.space.discrete
-        self._unit = np.where(whole, 1.0, problem.space.upper - problem.space.lower)
+        self._unit = np.where(whole, 1.0, problem.space.span)
         self._origin = np.where(whole, 0.0, problem.space.lower)
         self._idle = max(0, LEAST_DIMENSIONS - size)
         self._asked: list[FloatArray] = []
@@ -100,9 +100,9 @@ class CmaEs(Method):
                 if self.restarts is not None and self.restarted >= self.restarts:
                     return np.empty((0, self.space.size))
                 self.restarted += 1
-                # A generation beyond the budget would never be finished, and pycma would learn
-                # nothing.
-                self.population = max(self.population, min(2 * self.population, self._most()))
+                # A generation beyond the budget would never be finished, and teach pycma nothing.
+                most = min(MOST_POPULATION, self.problem.budget + self.problem.budget % 2)
+                self.population = max(self.population, min(2 * self.population, most))
                 self._begin(self.space.from_unit(self._random.random(self.space.size)))
             self._asked = self._strategy.ask()
         return self._point(np.array(self._asked))
@@ -118,10 +118,6 @@ class CmaEs(Method):
         with self._own_randomness():
             self._strategy.tell(solutions, (-values).tolist())
 
-    def _most(self) -> int:
-        """Return the largest population of a restart."""
-        return min(MOST_POPULATION, self.problem.budget + self.problem.budget % 2)
-
     def _begin(self, start: FloatArray) -> None:
         cma = _pycma()
         lower, upper = self._inner(self.space.lower), self._inner(self.space.upper)
@@ -130,7 +126,7 @@ class CmaEs(Method):
         # Bounds are half a step beyond the first and last integer, so that each has an equal share.
         lower[whole], upper[whole] = lower[whole] - 0.499, upper[whole] + 0.499
         spread = np.ones(self.space.size + self._idle)
-        spread[whole] = (self.space.upper - self.space.lower)[whole]
+        spread[whole] = self.space.span[whole]
         inner = self._inner(start)
         options: dict[str, Any] = {
             "bounds": [lower.tolist(), upper.tolist()],

@@ -93,7 +93,6 @@ class FeasibleRegion:
     ) -> None:
         """Store the constraints, and the names of the parts whose shapes points change."""
         self._space = space
-        self._span = space.upper - space.lower
         self._constraints = list(constraints)
         self._parts = list(parts)
         self._apart = [each for each in constraints if isinstance(each, NoCrossings)]
@@ -130,9 +129,7 @@ class FeasibleRegion:
         return self._bisect(wanted, allowed)
 
     def _design(self, unit: FloatArray) -> SensorDesign:
-        space = self._space
-        point = np.clip(space.lower + unit * self._span, space.lower, space.upper)
-        return space.apply(point)
+        return self._space.apply(self._space.from_unit(unit))
 
     def _bisect(self, wanted: FloatArray, allowed: FloatArray) -> FeasiblePoint:
         """Return the last feasible point from a feasible one to a wanted one, by bisection."""
@@ -189,7 +186,7 @@ class FeasibleRegion:
         if other in self._parts:
             corner = against.faces[pairs[chosen, 1], 0]
             moves -= np.einsum("nki,ki->kn", self._slopes(other)[:, corner], outward)
-        moves *= self._span
+        moves *= self._space.span
         length = np.linalg.norm(moves, axis=1)
         known = length > 0.0
         normals = -moves[known] / length[known, None]
@@ -221,9 +218,8 @@ def _nearest(wanted: FloatArray, planes: _Planes) -> FloatArray | None:
 def _active_normals(wanted: FloatArray, point: FloatArray, planes: _Planes) -> FloatArray:
     """Return orthonormal directions (k, n) in which active constraints hold a point back."""
     binding = planes.normals[planes.limits - planes.normals @ point < ACTIVE_TOLERANCE]
-    bounds = np.eye(len(point))[np.abs(point - wanted) > 0.0]
-    bounds = bounds[((point <= 0.0) | (point >= 1.0))[np.abs(point - wanted) > 0.0]]
-    rows = np.concatenate([binding, bounds])
+    at_bound = (point != wanted) & ((point <= 0.0) | (point >= 1.0))
+    rows = np.concatenate([binding, np.eye(len(point))[at_bound]])
     if not len(rows):
         return rows
     _, sizes, directions = np.linalg.svd(rows, full_matrices=False)

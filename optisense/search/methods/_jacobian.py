@@ -22,10 +22,8 @@ details of a shape, and large against rounding.
 """
 
 LINEAR = 1e-6
-"""Tolerance of linearity, mm: shapes that are predicted to this along a random direction depend
-linearly on the coordinates. It is far above rounding errors and far below any dimension of a
-sensor.
-"""
+"""Tolerance of linearity of shapes along a random direction, mm; far above rounding errors and far
+below any dimension of a sensor."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +105,7 @@ def camera_numbers(camera: Camera) -> FloatArray:
 
 def _beside(space: BoundSpace, point: FloatArray, number: int) -> tuple[FloatArray, FloatArray]:
     """Return two points at a small distance to either side of one, within the bounds."""
-    step = STEP * (space.upper[number] - space.lower[number])
+    step = STEP * space.span[number]
     after, before = point.copy(), point.copy()
     after[number] = min(point[number] + step, space.upper[number])
     before[number] = max(point[number] - step, space.lower[number])

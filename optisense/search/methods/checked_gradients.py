@@ -33,24 +33,18 @@ if TYPE_CHECKING:
     from optisense.optics.transport.ray_gradient import DifferentiableRays
 
 FEW_PARAMETERS = 8
-"""Largest number of parameters for which central differences by each parameter need no more scores
-than ray derivatives with their check. Differences over `STEP` also see past the small hills of a
-true score, on which ascents by derivatives end.
-"""
+"""Largest number of parameters for which central differences need no more scores than ray
+derivatives with their check; they also see past the small hills of a true score."""
 
 TOLERANCE = 0.05
 """Relative tolerance of the check of a derivative along a direction. It refers to the difference of
-the true score, or, if that is smaller, to the slope of an average random direction (the gradient's
-length over the root of the number of parameters).
-"""
+the true score or, if that is smaller, to the slope of an average random direction."""
 
 CHECKS_AT_START, CHECKS = 4, 1
 """Number of directions in which a gradient is compared with differences, at the start and
-elsewhere: the direction of the gradient, and at the start three random ones as well, which show
-errors that the steepest direction hides. Each takes four scores for ray derivatives, and two for
-differences. Ray derivatives that no difference contradicts at the start are not compared elsewhere:
-on GelSight Svelte's mirror that took more time than the search, and the differences that it then
-used were those of kinks and led no higher.
+elsewhere: that of the gradient, and at the start three random ones as well, which show errors that
+the steepest direction hides. Ray derivatives that no difference contradicts at the start are not
+compared elsewhere, which would take more time than the search and lead no higher.
 """
 
 SMOOTHED = "smoothed"
@@ -117,15 +111,9 @@ class GradientEvaluator(PickledWithoutCaches):
         seed: int,
         layers: bool = False,
     ) -> None:
-        """Store the settings; nothing is traced yet.
-
-        Args:
-            parts: names of the parts that points move.
-            objective: name of the score that is climbed.
-            resolution: number of rays across the image.
-            seed: seed of the search. Trials that are scored again with another seed need no
-                gradients, and get none.
-            layers: True if `usual` relights layers, so that all gradients are differences.
+        """Store the settings; nothing is traced yet. Points move `parts`, `resolution` rays are
+        traced across the image, and only trials with the seed of the search get gradients. With
+        `layers`, `usual` relights layers and all gradients are differences.
         """
         self.usual = usual
         self.parts = parts
@@ -135,7 +123,10 @@ class GradientEvaluator(PickledWithoutCaches):
         self.layers = layers
         limited = [each.objective().name for each in usual.requirements]
         self.wanted = [objective, *limited]
-        self._smooth = [None if layers else SmoothScore.of(name) for name in self.wanted]
+        smooth = [None if layers else SmoothScore.of(name) for name in self.wanted]
+        self._smooth = {k: each for k, each in enumerate(smooth) if each is not None}
+        self._rough = [k for k, each in enumerate(smooth) if each is None]
+        self._rough_names = [self.wanted[k] for k in self._rough]
         self._differences = ScoreDifferences(usual)
         self._contradicted: bool | None = None
 
@@ -161,15 +152,10 @@ class GradientEvaluator(PickledWithoutCaches):
 
     def checked_gradient(self, vector: FloatArray, seed: int) -> CheckedGradient:
         """Return the smoothed score at a point (n,), and a gradient that has been compared with the
-        score.
-
-        Ray derivatives are used unless differences of the score that agree with each other
+        score. Ray derivatives are used unless differences of the score that agree with each other
         contradict them: where the differences do not agree, ray derivatives are as good as any, and
         cost less. If none contradicts them at the start, they are trusted everywhere. The
         quantities that conditions limit are differentiated in the same way, without a check.
-
-        Raises:
-            OptiSenseError: the design can't be built, or no ray arrives.
         """
         if self.layers:
             gradients = self._differences.gradients(vector, seed, self.wanted)
@@ -201,11 +187,10 @@ class GradientEvaluator(PickledWithoutCaches):
             if found is Agreement.DIFFERS:
                 raise _ContradictedError
             holds = found is Agreement.HOLDS
-        rough = [k for k, smooth in enumerate(self._smooth) if smooth is None]
-        if rough:
-            names = [self.wanted[k] for k in rough]
-            gradients[rough] = self._differences.gradients(vector, seed, names)
-            values[rough] = self._differences.exact(self.usual.space.apply(vector), seed, names)
+        if self._rough:
+            gradients[self._rough] = self._differences.gradients(vector, seed, self._rough_names)
+            design = self.usual.space.apply(vector)
+            values[self._rough] = self._differences.exact(design, seed, self._rough_names)
         return CheckedGradient(values, gradients, GradientSource.RAYS, holds)
 
     def _contradicted_at_start(self, seed: int) -> bool:
@@ -221,11 +206,8 @@ class GradientEvaluator(PickledWithoutCaches):
         return self._contradicted
 
     def gradient(self, vector: FloatArray) -> tuple[float, FloatArray]:
-        """Return the smoothed score at a point (n,), and its gradient (n,) by ray derivatives.
-
-        Raises:
-            NoDerivativeError: ray derivatives are not defined for a part that moves.
-            OptiSenseError: the design can't be built, or no ray arrives.
+        """Return the smoothed score at a point (n,), and its gradient (n,) by ray derivatives;
+        NoDerivativeError if these are not defined for a part that moves.
         """
         values, gradients = self._slopes(vector)
         return float(values[0]), gradients[0]
@@ -244,9 +226,7 @@ class GradientEvaluator(PickledWithoutCaches):
             moves = jacobian(space, np.array(vector, dtype=np.float64), self.parts)
         values = np.full(len(self.wanted), np.nan)
         gradients = np.full((len(self.wanted), space.size), np.nan)
-        for number, smooth in enumerate(self._smooth):
-            if smooth is None:
-                continue
+        for number, smooth in self._smooth.items():
             slopes = smooth.slopes(rays, self.usual.settings)
             back = rays.pull_back(slopes.cosine, slopes.weight, slopes.points)
             gradient = moves.camera @ back.camera
@@ -284,13 +264,12 @@ class GradientEvaluator(PickledWithoutCaches):
     def _checks(self, vector: FloatArray, gradient: FloatArray) -> Iterator[_Check]:
         """Yield the directions in which a gradient (n,) is compared with the score."""
         space = self.usual.space
-        span = space.upper - space.lower
         blocked = (gradient > 0) & (vector >= space.upper) | (gradient < 0) & (
             vector <= space.lower
         )
         if blocked.all():
             return
-        scaled = np.where(blocked, 0.0, gradient * span)
+        scaled = np.where(blocked, 0.0, gradient * space.span)
         length = float(np.linalg.norm(scaled))
         at_start = np.array_equal(vector, space.start)
         random = np.random.default_rng(zlib.crc32(np.asarray(vector, dtype="<f8").tobytes()))
@@ -300,18 +279,12 @@ class GradientEvaluator(PickledWithoutCaches):
             ways.append(way / np.linalg.norm(way))
         typical = length / float(np.sqrt(np.count_nonzero(~blocked)))
         for way in ways:
-            yield _Check(way * span, float(way @ scaled), typical)
+            yield _Check(way * space.span, float(way @ scaled), typical)
 
     def difference(
         self, vector: FloatArray, way: FloatArray, step: float, seed: int
     ) -> float | None:
-        """Return the derivative of the true score along `way`; see `ScoreDifferences.along`.
-
-        Args:
-            vector: point (n,).
-            way: direction (n,), in the units of the coordinates.
-            step: step to each side, as a multiple of `way`.
-        """
+        """Return the derivative of the true score along `way`; see `ScoreDifferences.along`."""
         found = self._differences.along(vector, way, step, seed, self.wanted[:1])
         return None if found is None else float(found[0])
 
@@ -319,14 +292,12 @@ class GradientEvaluator(PickledWithoutCaches):
         """Return the smoothed values (1 + m,) at a point, or exact ones without a smooth form."""
         design = self.usual.space.apply(vector)
         values = np.full(len(self.wanted), np.nan)
-        if any(smooth is not None for smooth in self._smooth):
+        if self._smooth:
             rays = self._rays(design, ())
-            for number, smooth in enumerate(self._smooth):
-                if smooth is not None:
-                    values[number] = smooth.slopes(rays, self.usual.settings).value
-        rough = [k for k, smooth in enumerate(self._smooth) if smooth is None]
-        if rough:
-            values[rough] = self._differences.exact(design, seed, [self.wanted[k] for k in rough])
+            for number, smooth in self._smooth.items():
+                values[number] = smooth.slopes(rays, self.usual.settings).value
+        if self._rough:
+            values[self._rough] = self._differences.exact(design, seed, self._rough_names)
         return values
 
     def _rays(self, design: SensorDesign, moving: Sequence[str]) -> DifferentiableRays:

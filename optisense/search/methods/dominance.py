@@ -53,12 +53,8 @@ def front(values: ArrayLike) -> NDArray[np.int64]:
 
 
 def ranks(values: ArrayLike, broken: ArrayLike | None = None) -> NDArray[np.int64]:
-    """Return the ranks (k,): 0 for the Pareto front, 1 for the front of the rest, and so on (Deb et
-    al., "A fast and elitist multiobjective genetic algorithm: NSGA-II", 2002).
-
-    Args:
-        values: see `dominates`, (k, m).
-        broken: see `dominates`, (k,).
+    """Return the ranks (k,) of values (k, m): 0 for the Pareto front, 1 for the front of the rest,
+    and so on (Deb et al., "A fast and elitist multiobjective genetic algorithm: NSGA-II", 2002).
     """
     dominated = dominates(values, broken)
     rank = np.full(len(dominated), -1, dtype=np.int64)

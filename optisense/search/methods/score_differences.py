@@ -22,10 +22,8 @@ from optisense.search.space.search_space import BoundSpace
 
 STEP = 0.05
 """Step of central differences of the true score to each side, as a share of the parameters' ranges.
-A true score is a sum over pixels and triangles, which jumps where a row of pixels comes into view
-and has small hills where an edge passes the picture's corner: over shorter steps a difference says
-little about the direction of ascent. Checks also use half of this step.
-"""
+Over shorter steps a difference says little about the direction of ascent, as a true score jumps
+where rows of pixels or triangles come into view. Checks also use half of this step."""
 
 
 class GradientSource(Enum):
@@ -83,7 +81,6 @@ class TrialDifferences:
     def __init__(self, problem: Problem, requirements: Sequence[Requirement]) -> None:
         """Store what is differentiated: the first objective, and what conditions limit."""
         self._space, self._objective = problem.space, problem.objectives[0]
-        self._span = problem.space.upper - problem.space.lower
         self._requirements = requirements
 
     def around(self, point: FloatArray, known: Mapping[bytes, Outcome]) -> LocalValues | None:
@@ -99,7 +96,7 @@ class TrialDifferences:
         if values is None:
             return None
         gradients = np.zeros((len(values), self._space.size))
-        for number, span in enumerate(self._span):
+        for number, span in enumerate(self._space.span):
             ends = []
             for side in sides[2 * number : 2 * number + 2]:
                 exact = self._exact(known[side.tobytes()])
@@ -113,7 +110,7 @@ class TrialDifferences:
     def _beside(self, point: FloatArray) -> list[FloatArray]:
         """Return two points (n,) for each parameter, above and below, within the bounds."""
         found = []
-        for number, span in enumerate(self._span):
+        for number, span in enumerate(self._space.span):
             low, high = self._space.lower[number], self._space.upper[number]
             for way in (STEP, -STEP):
                 side = point.copy()
@@ -143,7 +140,7 @@ class ScoreDifferences:
         """
         space = self._usual.space
         gradients = np.zeros((len(names), space.size))
-        for number, span in enumerate(space.upper - space.lower):
+        for number, span in enumerate(space.span):
             way = np.zeros(space.size)
             way[number] = span
             found = self.along(vector, way, STEP, seed, names)
@@ -171,10 +168,8 @@ class ScoreDifferences:
         return np.asarray((found[0] - found[1]) / sum(room))
 
     def exact(self, design: SensorDesign, seed: int, names: Sequence[str]) -> FloatArray:
-        """Return the values of objectives, (k,).
-
-        Raises:
-            OptiSenseError: the design can't be built, or has no value for one of them.
+        """Return the values of objectives, (k,); OptiSenseError if the design has none for one of
+        them.
         """
         scores = self._usual.objective_scores(design, seed, names)
         for name in names:

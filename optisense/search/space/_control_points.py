@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from optisense.design import Cage, SensorDesign, Share, set_value
+from optisense.design import Cage, SensorDesign, set_value
 from optisense.design.cage import as_array
 from optisense.errors import SearchError
 from optisense.search.space.parameters import (
@@ -141,11 +141,10 @@ def span_of(cage: Cage) -> np.ndarray:
     return as_array(cage.c_max or []) - as_array(cage.c_min or [])
 
 
-def with_blend(design: SensorDesign, name: str, blend: float | list[Share]) -> SensorDesign:
-    """Return the design with its cage given by `blend` instead of points."""
-    plain = blend if isinstance(blend, float) else [share.model_dump() for share in blend]
+def with_form(design: SensorDesign, name: str, **form: object) -> SensorDesign:
+    """Return the design with other values of `points` and `blend` of a cage."""
     cage = design.cages[name].model_dump(mode="json")
-    return set_value(design, f"cages.{name}", {**cage, "points": [], "blend": plain})
+    return set_value(design, f"cages.{name}", {**cage, **form})
 
 
 def as_dicts(points: np.ndarray) -> list[dict[str, float]]:

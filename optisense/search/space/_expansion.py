@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel
 
-from optisense.design import Cage, SensorDesign, Share, get_value, parse_path, set_value
+from optisense.design import Cage, SensorDesign, get_value, parse_path
 from optisense.design.cage import as_array
 from optisense.design.colour import NAMED_COLOURS
 from optisense.errors import DesignError, SearchError
@@ -23,7 +23,7 @@ from optisense.search.space._control_points import (
     point_parameters,
     shares_of,
     span_of,
-    with_blend,
+    with_form,
 )
 from optisense.search.space._variable_paths import find_variables
 from optisense.search.space.design_variables import DesignVariable
@@ -49,15 +49,9 @@ RGB_FIELDS = (
 def expand(
     design: SensorDesign, path: str, spec: Specification
 ) -> tuple[SensorDesign, list[Parameter]]:
-    """Return the single parameters for one path.
-
-    Returns:
-        The design and the parameters. The design is changed in form, not in shape, where needed: a
-        cage given by its points gets a blend if the blend varies.
-
-    Raises:
-        DesignError: the path names nothing in the design; the message suggests a similar name.
-        SearchError: the path can't be varied like this.
+    """Return the single parameters for one path, and the design, changed in form and not in shape
+    where needed: a cage given by its points gets a blend if the blend varies. The error for a path
+    that names nothing, or that can't be varied like this, suggests another.
     """
     if isinstance(spec, Together):
         return _together(design, path, spec)
@@ -241,15 +235,13 @@ def _of_cage(
         gridded = isinstance(spec, Continuous) and spec.steps is not None
         if not isinstance(spec, CagePoints) and (isinstance(cage.blend, float) or gridded):
             share = cage.blend if isinstance(cage.blend, float) else mean_share(cage)
-            ready = with_blend(design, name, share)
+            ready = with_form(design, name, points=[], blend=share)
             return ready, [replace(each, asked=path) for each in _of_value(path, share, spec)]
         shares = shares_of(cage)
-        ready = with_blend(design, name, [Share(x=x, y=y, z=z) for x, y, z in shares.tolist()])
+        ready = with_form(design, name, points=[], blend=as_dicts(shares))
         return ready, point_parameters(cage, path, shares, given, free=span_of(cage) != 0.0)
     if cage.blend is not None:
-        points = cage.current_points()
-        change = {"blend": None, "points": as_dicts(points)}
-        design = set_value(design, f"cages.{name}", {**cage.model_dump(mode="json"), **change})
+        design = with_form(design, name, blend=None, points=as_dicts(cage.current_points()))
     points = as_array(design.cages[name].points)
     return design, point_parameters(cage, path, points, given, mirror=np.array(cage.box))
 

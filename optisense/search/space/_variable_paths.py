@@ -23,7 +23,7 @@ These look like other paths but lead to no single number of a design:
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection
 
 from optisense.design import SensorDesign
 from optisense.errors import DesignError, SearchError
@@ -45,7 +45,7 @@ from optisense.search.space.rigid_moves import (
     PartTurn,
 )
 
-MOVES: dict[tuple[str, str], Callable[[str, str, int], DesignVariable]] = {
+MOVES: dict[tuple[str, str], Callable[..., DesignVariable]] = {
     ("lights", "shift"): LightShift,
     ("lights", "turn"): GroupTurn,
     ("lights", "aim"): LightTurn,
@@ -95,11 +95,7 @@ def find_variables(design: SensorDesign, path: str) -> list[DesignVariable]:
 def _of_light(
     design: SensorDesign, path: str, group: str, index: int, what: str, letter: str | None
 ) -> list[DesignVariable]:
-    if group not in design.lights:
-        raise DesignError(
-            f"'{path}' does not exist: 'lights' has no '{group}'",
-            hint=suggestion(group, design.lights, limit=20),
-        )
+    _refuse_unknown(path, "lights", group, design.lights)
     count = len(design.lights[group].lights)
     if index >= count:
         raise DesignError(
@@ -108,10 +104,7 @@ def _of_light(
         )
     if what == "model":
         return [LightType(path, group, index)]
-    kind = LightShift if what == "shift" else LightTurn
-    if letter is not None:
-        return [kind(path, group, "xyz".index(letter), index)]
-    return [kind(f"{path}.{each}", group, axis, index) for axis, each in enumerate("xyz")]
+    return _along_axes(LightShift if what == "shift" else LightTurn, path, letter, group, index)
 
 
 def _moves(
@@ -121,12 +114,9 @@ def _moves(
         raise SearchError(
             "the camera has no shift", where=path, hint="Vary camera.position.x instead"
         )
-    known: Iterable[str] = design.parts if section == "parts" else design.lights
-    if section != "camera" and name not in known:
-        raise DesignError(
-            f"'{path}' does not exist: '{section}' has no '{name}'",
-            hint=suggestion(name, known, limit=20),
-        )
+    if section != "camera":
+        known: Collection[str] = design.parts if section == "parts" else design.lights
+        _refuse_unknown(path, section, name, known)
     if letter is not None and letter not in ("x", "y", "z"):
         raise DesignError(f"'{path}' does not exist: there is no axis '{letter}'", hint="x, y or z")
     if section == "parts":
@@ -137,7 +127,21 @@ def _moves(
                     where=path,
                     hint=f"Vary cages.{cage_name}.points",
                 )
-    kind = MOVES[section, what]
+    return _along_axes(MOVES[section, what], path, letter, name)
+
+
+def _along_axes(
+    kind: Callable[..., DesignVariable], path: str, letter: str | None, name: str, *index: int
+) -> list[DesignVariable]:
+    """Return the moves along or about one axis, or all three without a letter."""
     if letter is not None:
-        return [kind(path, name, "xyz".index(letter))]
-    return [kind(f"{path}.{each}", name, axis) for axis, each in enumerate("xyz")]
+        return [kind(path, name, "xyz".index(letter), *index)]
+    return [kind(f"{path}.{each}", name, axis, *index) for axis, each in enumerate("xyz")]
+
+
+def _refuse_unknown(path: str, section: str, name: str, known: Collection[str]) -> None:
+    if name not in known:
+        raise DesignError(
+            f"'{path}' does not exist: '{section}' has no '{name}'",
+            hint=suggestion(name, known, limit=20),
+        )

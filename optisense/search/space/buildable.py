@@ -73,8 +73,6 @@ class PartsInContact:
         """Return a message with the two parts that have come apart, or None."""
         meshes = design.deformed_meshes()
         for one, other in self._pairs:
-            if one not in meshes or other not in meshes:
-                continue
             if all(same_shape(meshes[name], self._meshes[name]) for name in (one, other)):
                 continue
             first, second = self._seat(one, other)
@@ -114,12 +112,7 @@ class ContactPoints(NamedTuple):
 
     @staticmethod
     def of(mesh: TriangleMesh, faces: NDArray[np.int64], other: TriangleMesh) -> ContactPoints:
-        """Return points spread evenly over some faces of a mesh that touch another mesh.
-
-        Args:
-            faces: indices (k,) of its faces that lie on the other mesh.
-            other: the mesh that the points touch.
-        """
+        """Return points spread evenly over those faces (k,) of a mesh that touch another mesh."""
         reached = np.cumsum(mesh.face_areas[faces])
         if len(faces) == 0 or reached[-1] <= 0.0:
             return ContactPoints(np.zeros(0, dtype=np.int64), np.zeros((0, 3)))

@@ -133,10 +133,8 @@ class UserRule(PickledWithoutCaches):
 
     @cached_property
     def loaded(self) -> Constraint:
-        """Function in the file, which is run once.
-
-        Raises:
-            SearchError, ObjectiveError: the file or the function is missing, or the file fails.
+        """Function in the file, which is run once; an error if one of them is missing or the file
+        fails.
         """
         from optisense.objectives.files import run_file
 
@@ -148,10 +146,8 @@ class UserRule(PickledWithoutCaches):
 
 
 def why_forbidden(design: SensorDesign, constraints: Sequence[Constraint]) -> str | None:
-    """Return the reason why a design is forbidden, or None.
-
-    Raises:
-        SearchError: a rule fails, or returns something other than a bool, a text or None.
+    """Return the reason why a design is forbidden, or None; SearchError if a rule fails or gives no
+    valid answer.
     """
     for rule in constraints:
         try:

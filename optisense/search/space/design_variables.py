@@ -50,10 +50,8 @@ class DesignVariable(ABC):
 
     @abstractmethod
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
-        """Return a changed design, which shares everything else with the given one.
-
-        Raises:
-            OptiSenseError: the value does not fit.
+        """Return a changed design, which shares everything else with the given one; OptiSenseError
+        if the value does not fit, such as a name that is not in the library.
         """
 
 
@@ -65,11 +63,7 @@ class LibraryCoating(DesignVariable):
         return design.coating.library
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
-        """Return the design with the coating of the library that `value` names.
-
-        Raises:
-            LibraryError: the library has no such coating.
-        """
+        """Return the design with the coating of the library that `value` names."""
         if value == design.coating.library:
             return design
         return design.model_copy(update={"coating": library.coating(str(value))})
@@ -88,11 +82,7 @@ class LibraryCamera(DesignVariable):
         return design.camera.model
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
-        """Return the design with the camera of the library that `value` names, in the same pose.
-
-        Raises:
-            LibraryError: the library has no such camera.
-        """
+        """Return the design with the camera of the library that `value` names, in the same pose."""
         if value == design.camera.model:
             return design
         known = library.camera(str(value))
@@ -116,11 +106,7 @@ class PartMaterial(DesignVariable):
         return design.parts[self.name].material
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
-        """Return the design with the part of the material that `value` names.
-
-        Raises:
-            LibraryError: neither the design nor the library has such a material.
-        """
+        """Return the design with the part of the material that `value` names."""
         materials = design.materials
         if value not in materials:
             materials = {**materials, str(value): library.material(str(value))}
@@ -141,11 +127,7 @@ class GroupType(DesignVariable):
         return models.pop() if len(models) == 1 else None
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
-        """Return the design with lights of the model that `value` names.
-
-        Raises:
-            LibraryError: the library has no such light.
-        """
+        """Return the design with lights of the model that `value` names."""
         lights = dict(design.lights)
         for name in self._groups(design):
             if lights[name].model != value:
@@ -170,20 +152,13 @@ class LightType(DesignVariable):
         return design.lights[self.group].model
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
-        """Return the design with this light of the model that `value` names; see
-        `with_light_types`.
-
-        Raises:
-            LibraryError: the library has no such light.
-        """
+        """Return the design with this light of the model that `value` names."""
         return with_light_types(design, {(self.group, self.index): str(value)})
 
 
 def with_light_types(design: SensorDesign, types: dict[tuple[str, int], str]) -> SensorDesign:
-    """Return a design in which some lights, by group and index, are of other types.
-
-    Raises:
-        LibraryError: the library has no such light; the message suggests a similar name.
+    """Return a design in which some lights, by group and index, are of other
+    types of the library.
     """
     groups = {}
     for name, group in design.lights.items():

@@ -179,7 +179,7 @@ class BoundManufacturingErrors:
                     ranges[each.name] = _limits(prepared, each, source)
                 owner += [number] * len(found)
         self.owner = np.array(owner)
-        self.space = _ErrorSpace(SearchSpace(ranges), prepared)
+        self.space = BoundSpace(SearchSpace(ranges), prepared, tried=False)
 
     @property
     def size(self) -> int:
@@ -205,19 +205,7 @@ class BoundManufacturingErrors:
 
     def points(self, errors: FloatArray) -> FloatArray:
         """Return points (..., d) of the space for errors (..., d), clipped to the limits."""
-        return np.clip(self.space.now + errors, self.space.lower, self.space.upper)
-
-
-class _ErrorSpace(BoundSpace):
-    """Space whose bounds are the limits of the design.
-
-    Attributes:
-        now: values (d,) in the design.
-    """
-
-    def __init__(self, space: SearchSpace, design: SensorDesign) -> None:
-        super().__init__(space, design, tried=False)
-        self.now = self.start
+        return np.clip(self.space.start + errors, self.space.lower, self.space.upper)
 
 
 def latin_hypercube(count: int, size: int, seed: int) -> FloatArray:

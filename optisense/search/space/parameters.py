@@ -104,6 +104,16 @@ class Choice:
         """Indices of the options."""
         return tuple(float(number) for number in range(len(self.options)))
 
+    @property
+    def low(self) -> int:
+        """Index of the first option."""
+        return 0
+
+    @property
+    def high(self) -> int:
+        """Index of the last option."""
+        return len(self.options) - 1
+
 
 @dataclass(frozen=True)
 class Around:
@@ -316,5 +326,4 @@ class Parameter:
 
 def within(value: float, kind: Single) -> float:
     """Return the number nearest to a value within the bounds of a kind."""
-    assert not isinstance(kind, Choice)
     return min(max(value, float(kind.low)), float(kind.high))

@@ -17,7 +17,6 @@ from optisense.search.space.constraints import Constraint
 from optisense.search.space.design_variables import LightType, with_light_types
 from optisense.search.space.parameters import (
     Choice,
-    Continuous,
     Integer,
     Parameter,
     Specification,
@@ -102,7 +101,7 @@ class BoundSpace:
         design: design that it was bound to.
         prepared: the same design in the form to set parameters in (a cage with a blend, say).
         parameters: parameter of each coordinate.
-        lower, upper: bounds (n,), included.
+        lower, upper, span: bounds (n,), included, and the ranges between them.
         start: the design as a point (n,), or the point nearest to it.
         discrete: coordinates (n,) that are integers (integers and choices), bool.
         reshapes: whether a parameter moves surfaces.
@@ -121,8 +120,9 @@ class BoundSpace:
         self.parameters = tuple(found)
         self._check_apart()
         kinds = [parameter.kind for parameter in found]
-        self.lower = np.array([_low(kind) for kind in kinds])
-        self.upper = np.array([_high(kind) for kind in kinds])
+        self.lower = np.array([float(kind.low) for kind in kinds])
+        self.upper = np.array([float(kind.high) for kind in kinds])
+        self.span = self.upper - self.lower
         self.start = np.array([parameter.start for parameter in found])
         self.discrete = np.array([isinstance(kind, Integer | Choice) for kind in kinds])
         sections = {parameter.name.split(".")[0] for parameter in found}
@@ -172,7 +172,7 @@ class BoundSpace:
 
     def to_unit(self, vector: ArrayLike) -> FloatArray:
         """Return coordinates (..., n) from 0 at the lower to 1 at the upper bounds."""
-        return np.asarray((np.asarray(vector) - self.lower) / (self.upper - self.lower))
+        return np.asarray((np.asarray(vector) - self.lower) / self.span)
 
     def from_unit(self, unit: ArrayLike) -> FloatArray:
         """Return the point (..., n) for coordinates 0 to 1, clipped, and rounded where `discrete`.
@@ -180,9 +180,8 @@ class BoundSpace:
         Integers share the unit interval evenly: four options get a quarter each.
         """
         share = np.clip(np.asarray(unit, dtype=np.float64), 0.0, 1.0)
-        span = self.upper - self.lower
-        counted = self.lower + np.minimum(np.floor(share * (span + 1.0)), span)
-        smooth = np.clip(self.lower + share * span, self.lower, self.upper)
+        counted = self.lower + np.minimum(np.floor(share * (self.span + 1.0)), self.span)
+        smooth = np.clip(self.lower + share * self.span, self.lower, self.upper)
         return np.where(self.discrete, counted, smooth)
 
     def unit_of(self, vector: ArrayLike) -> FloatArray:
@@ -191,7 +190,7 @@ class BoundSpace:
         An integer gets the middle of its interval.
         """
         point = np.asarray(vector, dtype=np.float64)
-        middle = (point - self.lower + 0.5) / (self.upper - self.lower + 1.0)
+        middle = (point - self.lower + 0.5) / (self.span + 1.0)
         return np.where(self.discrete, middle, self.to_unit(point))
 
     def apply(self, vector: ArrayLike) -> SensorDesign:
@@ -234,31 +233,21 @@ class BoundSpace:
         """Look up all paths once, so that applying a point is fast. Options, which users wrote, are
         set with a check that converts them to the type of their field.
         """
-        paths: list[str] = []
-        source: list[int] = []
-        scale: list[float] = []
-        offset: list[float] = []
-        self._integers: list[tuple[int, int]] = []
-        self._chosen: list[tuple[str, int]] = []
-        for number, parameter in enumerate(self.parameters):
-            for target in parameter.targets:
-                if isinstance(parameter.kind, Choice):
-                    get_value(self.prepared, target.path)
-                    self._chosen.append((target.path, number))
-                    continue
-                if isinstance(parameter.kind, Integer):
-                    self._integers.append((len(paths), number))
-                paths.append(target.path)
-                source.append(number)
-                scale.append(target.scale)
-                offset.append(target.offset)
-        self._edit = Edit(self.prepared, paths)
-        self._source = np.array(source, dtype=np.int64)
-        self._scale, self._offset = np.array(scale), np.array(offset)
-        handled = [(n, p.variable) for n, p in enumerate(self.parameters) if p.variable is not None]
-        self._first = [(n, h) for n, h in handled if h.stage == 0]
-        self._moves = [(n, h) for n, h in handled if h.stage == 2]
-        self._types = [(n, h) for n, h in handled if isinstance(h, LightType)]
+        targets = [(n, each) for n, p in enumerate(self.parameters) for each in p.targets]
+        kinds = [parameter.kind for parameter in self.parameters]
+        self._chosen = [(each.path, n) for n, each in targets if isinstance(kinds[n], Choice)]
+        for path, _ in self._chosen:
+            get_value(self.prepared, path)
+        direct = [(n, each) for n, each in targets if not isinstance(kinds[n], Choice)]
+        self._integers = [(k, n) for k, (n, _) in enumerate(direct) if self.discrete[n]]
+        self._edit = Edit(self.prepared, [each.path for _, each in direct])
+        self._source = np.array([n for n, _ in direct], dtype=np.int64)
+        self._scale = np.array([each.scale for _, each in direct])
+        self._offset = np.array([each.offset for _, each in direct])
+        changed = [(n, p.variable) for n, p in enumerate(self.parameters) if p.variable is not None]
+        self._first = [(n, each) for n, each in changed if each.stage == 0]
+        self._moves = [(n, each) for n, each in changed if each.stage == 2]
+        self._types = [(n, each) for n, each in changed if isinstance(each, LightType)]
 
     def _check_apart(self) -> None:
         """Refuse two parameters that set the same value."""
@@ -280,8 +269,8 @@ class BoundSpace:
         for number, parameter in enumerate(self.parameters):
             if parameter.targets and parameter.name.startswith("cages."):
                 continue
-            tried = self._levels_to_try(number)
-            for coordinate in tried:
+            kind = parameter.kind
+            for coordinate in kind.levels if isinstance(kind, Choice) else (kind.low, kind.high):
                 point = self.start.copy()
                 point[number] = coordinate
                 self._try(point, parameter.name)
@@ -290,36 +279,16 @@ class BoundSpace:
             for bound in (self.lower, self.upper):
                 self._try(np.where(in_cages, bound, self.start), "cages")
 
-    def _levels_to_try(self, number: int) -> Sequence[float]:
-        kind = self.parameters[number].kind
-        if isinstance(kind, Choice):
-            return kind.levels
-        return (float(kind.low), float(kind.high))
-
     def _try(self, point: FloatArray, where: str) -> None:
         try:
-            design = self.apply(point)
-            if self._sure:  # else `apply` has checked it
-                checked(design)
+            checked(self.apply(point))
         except OptiSenseError as error:
             raise type(error)(error.message, where=where, hint=error.hint) from None
 
 
 def checked(design: SensorDesign) -> SensorDesign:
-    """Return a design after all checks of its fields.
-
-    Raises:
-        DesignError: a value does not fit.
-    """
+    """Return a design after all checks of its fields; DesignError if a value does not fit."""
     return design._replaced(design._data(), where="the varied design")
-
-
-def _low(kind: Continuous | Integer | Choice) -> float:
-    return 0.0 if isinstance(kind, Choice) else float(kind.low)
-
-
-def _high(kind: Continuous | Integer | Choice) -> float:
-    return float(len(kind.options) - 1) if isinstance(kind, Choice) else float(kind.high)
 
 
 def _meaning(parameter: Parameter, coordinate: float) -> float | int | str:

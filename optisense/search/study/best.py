@@ -52,7 +52,7 @@ def distance(trial: Trial) -> float:
     a choice count as 0 (the same) or 1 (another one).
     """
     space = trial.space
-    share = np.abs(trial.vector - space.start) / (space.upper - space.lower)
+    share = np.abs(trial.vector - space.start) / space.span
     choices = np.array([isinstance(each.kind, Choice) for each in space.parameters])
     return float(np.linalg.norm(np.where(choices, share > 0.0, share)))
 

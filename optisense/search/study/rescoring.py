@@ -52,9 +52,7 @@ full score takes as long as six coarse ones.
 
 DEVIATIONS = 2.0
 """Number of standard deviations by which the full score of a trial may exceed what its coarse score
-suggests. A trial that would not lead even then is not promoted (95 % of a normal distribution are
-within two).
-"""
+suggests; 95 % of a normal distribution are within two."""
 
 SAME_DESIGN = 0.02
 """Largest difference between two points, as a share of each range, at which they count as the same
@@ -189,7 +187,7 @@ def _different(trials: Sequence[Trial]) -> list[Trial]:
         return []
     space = trials[0].space
     choices = np.array([isinstance(each.kind, Choice) for each in space.parameters])
-    span = np.where(choices, 1.0, space.upper - space.lower)
+    span = np.where(choices, 1.0, space.span)
     kept: list[Trial] = []
     points = np.empty((0, space.size))
     for trial in trials:
