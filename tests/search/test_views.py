@@ -14,7 +14,7 @@ import optisense as ots
 from optisense import sensors
 from optisense.design import SensorDesign
 from optisense.search.evaluation.evaluator import DesignEvaluator
-from optisense.search.evaluation.views import SameMirrors
+from optisense.search.evaluation.models import SameMirrors
 from optisense.search.space.search_space import SearchSpace
 
 RAYS = {"ray_resolution": (40, 30)}

@@ -40,16 +40,10 @@ three times the 50 that `reading` needs, because other designs may show the cont
 def coarse_settings(
     design: SensorDesign, settings: Mapping[str, Any], share: float = LEAST_SHARE
 ) -> dict[str, Any]:
-    """Return the settings of coarse scores: fewer pixels, an eighth of the photons, and all presses
-    in one image, where contacts do not overlap.
-
+    """Return the settings of coarse scores for those of full scores: images of a share of their
+    width, an eighth of the photons, and all presses in one image, where contacts do not overlap.
     Rays of the camera are not changed: they cost little beside images, and conditions on coverage
     and distortion are then as exact as in a full score.
-
-    Args:
-        design: design that the search starts from.
-        settings: settings of full scores.
-        share: width of the images, as a share of that of full scores.
     """
     width, height = _full_size(design, settings)
     across = math.ceil(share * width)

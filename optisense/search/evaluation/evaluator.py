@@ -23,10 +23,9 @@ from optisense.objectives.registry import CONDITIONS, WATCHED, find
 from optisense.objectives.run import split_settings
 from optisense.objectives.scoring import score_of
 from optisense.own_code import place_of
-from optisense.search.evaluation.models import ModelCache
+from optisense.search.evaluation.models import ModelCache, SameMirrors, least_skin, may_change_view
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.evaluation.requirements import requirements_of
-from optisense.search.evaluation.views import SameMirrors, least_skin, may_change_view
 from optisense.search.space.buildable import (
     LightsOnSupports,
     LightsOutsideParts,
@@ -65,15 +64,13 @@ MOVES_LIGHTS = re.compile(r"^lights\..*\b(shift|turn|position)\b")
 
 WATCHED_OBJECTIVES = ("coverage", "distortion")
 """Objectives by chief rays that are scored with every trial where the view may change, so that a
-report can say that a design gains its score by seeing less of the skin, or by seeing it distorted.
-They take a tenth of the time of AOAP.
-"""
+report can say that a design sees less of the skin, or sees it distorted. They take a tenth of the
+time of AOAP."""
 
 READING = "reading"
 """Objective that is scored with every trial whose goals or conditions need the same presses, so
-that a report can say that a design gains its score and is read worse. It takes about a tenth of the
-time of such a trial.
-"""
+that a report can say that a design is read worse. It takes about a tenth of the time of such a
+trial."""
 
 SAME_PRESSES = {"rgb2normal", "normdiff", "depth"}
 """Objectives that need the presses of `READING`."""
@@ -163,7 +160,6 @@ class DesignEvaluator(PickledWithoutCaches):
         if keeps:
             self._add_preserving(apart is None or apart)
         self._asks_view = keeps and self.renders and may_change_view(space.names)
-        self._least_skin: float | None = None
         self._watched = self._names_to_watch() if keeps and self.renders else ()
         self.variant = variant
         self._check_settings()
@@ -176,10 +172,6 @@ class DesignEvaluator(PickledWithoutCaches):
         except OptiSenseError as error:
             return self.failed(str(error), began)
         return self.evaluate(design, seed, self.kept)
-
-    def why_excluded(self, design: SensorDesign) -> str | None:
-        """Return the reason why a design breaks a constraint in `kept`, or None."""
-        return why_forbidden(design, self.kept)
 
     def evaluate(
         self, design: SensorDesign, seed: int, further: Sequence[Constraint] = ()
@@ -231,8 +223,6 @@ class DesignEvaluator(PickledWithoutCaches):
         """
         settings = dict(self.used_settings)
         if self._asks_view and "least_skin" not in settings:
-            if self._least_skin is None:
-                self._least_skin = least_skin(self.space.design, self.models)
             settings["least_skin"] = self._least_skin
         model = self.models.model(design)
         wanted = self._all_objectives
@@ -309,6 +299,11 @@ class DesignEvaluator(PickledWithoutCaches):
         """Objectives of goals and conditions."""
         goals = [goal_of(each) for each in self._objectives]
         return [*goals, *(each.objective() for each in self.requirements)]
+
+    @cached_property
+    def _least_skin(self) -> float:
+        """Share of the sensing surface that trials must see."""
+        return least_skin(self.space.design, self.models)
 
     @cached_property
     def _progress(self) -> ProgressCallback | None:

@@ -6,7 +6,6 @@ weighted sums, with no new rendering.
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -57,21 +56,20 @@ class RelitEvaluator(DesignEvaluator):
         """See `DesignEvaluator.objective_scores`."""
         if seed not in self._images:
             while len(self._images) >= KEPT_SEEDS:
-                self._images.popitem(last=False)
+                del self._images[next(iter(self._images))]
             model = self.models.model(self.space.prepared)
             self._images[seed] = _SeedImages(
                 model, self._all_objectives, self.settings, seed, self._progress
             )
-        self._images.move_to_end(seed)
         found = self._images[seed].scores(design, only)
         if not self.brief:
             return found
         return {name: _without_details(score) for name, score in found.items()}
 
     @cached_property
-    def _images(self) -> OrderedDict[int, _SeedImages]:
+    def _images(self) -> dict[int, _SeedImages]:
         """Images and objectives of the last seeds, by the seed."""
-        return OrderedDict()
+        return {}
 
 
 RELIGHTABLE = frozenset({"rgb2normal", "normdiff", "reading", "depth"})
@@ -115,12 +113,9 @@ class _SeedImages:
         cut, whole = (self._relighting.relit(design, whole=each) for each in (False, True))
         found = {}
         for each in self._objectives:
-            if only is not None and each.name not in only:
-                continue
-            if _reads_contacts_only(each):
-                found[each.name] = run_objective(each, cut, self._own[each.name])
-            else:
-                found[each.name] = run_objective(each, whole, self._own[each.name])
+            if only is None or each.name in only:
+                evaluation = cut if _reads_contacts_only(each) else whole
+                found[each.name] = run_objective(each, evaluation, self._own[each.name])
         return found
 
 

@@ -48,6 +48,7 @@ class Requirement:
         return f"{self.quantity} {'>=' if self.at_least else '<='} {self.limit:.10g}"
 
     @staticmethod
+    @lru_cache(maxsize=256)  # all trials of a study have the same few
     def parse(text: str) -> Requirement:
         """Parse a condition.
 
@@ -64,8 +65,7 @@ class Requirement:
         if not math.isfinite(limit):
             raise _without_limit(text, found)
         if not found["what"].strip():
-            problem = f"nothing is named before '{found['sign']}'"
-            raise SearchError(marked(text, 0, problem).message, hint=HINT)
+            raise _error_at(text, 0, f"nothing is named before '{found['sign']}'")
         try:
             quantity = Expression.parse(found["what"]).text
         except ObjectiveError as error:
@@ -103,17 +103,20 @@ class Requirement:
             raise SearchError(error.message, where=str(self), hint=error.hint) from None
 
 
+def _error_at(text: str, place: int, problem: str, hint: str = HINT) -> SearchError:
+    """Return the error of a condition, which marks a place in its text."""
+    return SearchError(marked(text, place, problem).message, hint=hint)
+
+
 def _without_comparison(text: str) -> SearchError:
     """Return the error of a condition that does not compare a quantity with a number."""
-    signs = re.search(r"[<>=]+", text)
-    if signs is None:
+    signs = list(re.finditer(r"[<>=]+", text))
+    if not signs:
         problem = "a condition needs '>=' or '<=' and a number"
         hint = f"{HINT}, with the quotes: without them the shell takes what follows '>' or '<'"
-        return SearchError(marked(text, len(text.rstrip()), problem).message, hint=hint)
-    problem = "a condition has one '>=' or '<='"
-    second = re.search(r"[<>=]+", text[signs.end() :])
-    place = signs.end() + second.start() if second and signs[0] in (">=", "<=") else signs.start()
-    return SearchError(marked(text, place, problem).message, hint=HINT)
+        return _error_at(text, len(text.rstrip()), problem, hint)
+    wrong = signs[1] if len(signs) > 1 and signs[0][0] in (">=", "<=") else signs[0]
+    return _error_at(text, wrong.start(), "a condition has one '>=' or '<='")
 
 
 def _without_limit(text: str, found: re.Match[str]) -> SearchError:
@@ -128,7 +131,7 @@ def _without_limit(text: str, found: re.Match[str]) -> SearchError:
         elif unit:
             hint += f", in {unit}"
         problem = "the limit of a condition is a number without a unit"
-        return SearchError(marked(text, place + number.end(), problem).message, hint=hint)
+        return _error_at(text, place + number.end(), problem, hint)
     problem, hint = "the limit of a condition is a number", HINT
     try:
         limit = float(found["what"])
@@ -138,7 +141,7 @@ def _without_limit(text: str, found: re.Match[str]) -> SearchError:
         other = "<=" if found["sign"] == ">=" else ">="
         problem = "the limit of a condition stands on its right side"
         hint = f"Write it as '{found['limit'].strip()}{other}{limit:g}'"
-    return SearchError(marked(text, place, problem).message, hint=hint)
+    return _error_at(text, place, problem, hint)
 
 
 def _unit_of(quantity: str) -> str:
@@ -181,23 +184,11 @@ def _refuse_impossible(wanted: Requirement) -> None:
         )
 
 
-@lru_cache(maxsize=256)
-def _requirement(text: str) -> Requirement:
-    """Parse a condition; results are cached, as all trials of a study have the same few."""
-    return Requirement.parse(text)
-
-
 def total_violation(conditions: Mapping[str, float | None]) -> float:
-    """Return the sum of the violations of all conditions of a design.
-
-    Args:
-        conditions: value of the limited quantity by the text of each condition; None where it could
-            not be measured.
-
-    Raises:
-        SearchError: a text is no condition.
+    """Return the sum of the violations of all conditions of a design, for the value of the limited
+    quantity by the text of each condition; None where it could not be measured.
     """
     return sum(
-        _requirement(text).violation(math.nan if value is None else value)
+        Requirement.parse(text).violation(math.nan if value is None else value)
         for text, value in conditions.items()
     )

@@ -17,6 +17,7 @@ from optisense.objectives.registry import CONDITIONS
 from optisense.search.evaluation.evaluator import DesignEvaluator
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.evaluation.requirements import Requirement
+from optisense.search.space.constraints import why_forbidden
 from optisense.search.space.manufacturing import (
     SAMPLES,
     BoundManufacturingErrors,
@@ -24,7 +25,7 @@ from optisense.search.space.manufacturing import (
     latin_hypercube,
 )
 
-LOW, MIDDLE, HIGH = 0.1, 0.5, 0.9
+PERCENTILES = {"p10": 0.1, "p50": 0.5, "p90": 0.9}
 """Quantiles of the scores of manufactured sensors: P10, which is the robust score, as nine of ten
 sensors reach it, and P50 and P90, which are reported beside it.
 """
@@ -60,7 +61,7 @@ class RobustEvaluator:
         began = time.perf_counter()
         try:
             design = self.usual.space.apply(vector)
-            reason = self.usual.why_excluded(design)
+            reason = why_forbidden(design, self.usual.kept)
             bound = self.errors.bind(design)
         except OptiSenseError as error:
             return self.usual.failed(str(error), began)
@@ -77,14 +78,9 @@ class RobustEvaluator:
         scores, parts = {}, {}
         for name in self.usual.names:
             values = [outcome.scores.get(name, math.nan) for outcome in found]
-            scores[name] = percentile(values, LOW)
-            middle, high = percentile(values, MIDDLE), percentile(values, HIGH)
-            parts[name] = {
-                "p10": json_ready(scores[name]),
-                "p50": json_ready(middle),
-                "p90": json_ready(high),
-                "samples": json_ready(values),
-            }
+            several = {key: percentile(values, share) for key, share in PERCENTILES.items()}
+            scores[name] = several["p10"]
+            parts[name] = json_ready({**several, "samples": values})
         if self.usual.requirements:
             parts[CONDITIONS] = {
                 str(each): json_ready(_reached(each, found)) for each in self.usual.requirements
@@ -109,18 +105,14 @@ def _reached(wanted: Requirement, found: Sequence[Outcome]) -> float:
     """
     measured = [outcome.conditions.get(str(wanted)) for outcome in found]
     values = np.array([math.nan if value is None else value for value in measured])
-    return percentile(values, LOW) if wanted.at_least else -percentile(-values, LOW)
+    low = PERCENTILES["p10"]
+    return percentile(values, low) if wanted.at_least else -percentile(-values, low)
 
 
 def percentile(values: ArrayLike, share: float) -> float:
-    """Return a percentile of values (k,), with linear interpolation between neighbours.
-
-    Failed values (NaN) count as lower than any other; the result is NaN if the percentile falls
-    among them.
-
-    Args:
-        values: values (k,) in any order.
-        share: percentile as a share, 0 (lowest) to 1 (highest).
+    """Return a percentile, as a share 0 to 1, of values (k,), with linear interpolation between
+    neighbours. Failed values (NaN) count as lower than any other; the result is NaN if the
+    percentile falls among them.
     """
     ordered = np.sort(np.nan_to_num(np.asarray(values, dtype=np.float64), nan=-np.inf))
     place = share * (len(ordered) - 1)

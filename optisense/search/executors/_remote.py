@@ -42,10 +42,6 @@ HOW_TO_START = (
 
 _evaluators: dict[str, Evaluator] = {}
 _blobs: dict[str, bytes] = {}
-MOST_EVALUATORS = 64
-"""Largest number of pickled evaluators that a worker keeps. A search that ends removes its own; one
-whose process was killed does not.
-"""
 _one_at_a_time = threading.Lock()
 """Lock that serves one trial at a time, since an evaluator keeps one model for all threads."""
 
@@ -201,10 +197,8 @@ def _unpacked(blob: bytes) -> Evaluator:
 
 
 def store_evaluator(key: str, blob: bytes) -> None:
-    """Keep an evaluator for `score_trial` in this process, and drop the oldest of too many."""
+    """Keep a pickled evaluator for `score_trial` in this process."""
     _blobs[key] = blob
-    while len(_blobs) > MOST_EVALUATORS:
-        del _blobs[next(iter(_blobs))]
 
 
 def drop_evaluator(key: str) -> None:

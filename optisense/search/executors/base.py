@@ -8,7 +8,7 @@ import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
-from types import FrameType, TracebackType
+from types import FrameType
 from typing import IO, Any
 
 import numpy as np
@@ -54,12 +54,7 @@ class Runner(ABC):
     def __enter__(self) -> Runner:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
 
@@ -120,11 +115,7 @@ class SerialRunner(Runner):
 
 
 def outcome_of(done: Future[Outcome]) -> Outcome:
-    """Return the outcome of a future.
-
-    Raises:
-        OptiSenseError: no trial can be scored.
-    """
+    """Return the outcome of a future; OptiSenseError if no trial can be scored."""
     error = done.exception()
     if error is None:
         return done.result()
@@ -140,14 +131,9 @@ def run_jobs(
     finished: Callable[[int, Outcome], None],
     waiting: Callable[[], None] = lambda: None,
 ) -> None:
-    """Keep an executor busy with jobs (number, point, seed), and pass on each outcome.
-
-    Args:
-        finished: function that is called with the number of each job and its outcome.
-        waiting: function that is called every `TICK` seconds while jobs run.
-
-    Raises:
-        OptiSenseError: no trial can be scored.
+    """Keep an executor busy with jobs (number, point, seed), and call `finished` with the number of
+    each and its outcome, and `waiting` every `TICK` seconds; OptiSenseError if no trial can be
+    scored.
     """
     left = list(reversed(jobs))
     running: dict[Future[Outcome], int] = {}
@@ -163,10 +149,8 @@ def run_jobs(
 
 
 def pickled(evaluator: Evaluator) -> bytes:
-    """Return an evaluator as bytes for other processes.
-
-    Raises:
-        SearchError: the evaluator holds an object that can't be pickled.
+    """Return an evaluator as bytes for other processes; SearchError if one of
+    its objects can't be.
     """
     try:
         blob = pickle.dumps(evaluator, protocol=pickle.HIGHEST_PROTOCOL)
@@ -182,21 +166,13 @@ def pickled(evaluator: Evaluator) -> bytes:
 
 
 def send(stream: IO[bytes], message: Any) -> None:
-    """Write a message between a pool and its workers as a pickle, which ends by itself.
-
-    Raises:
-        OSError: the process at the other end has closed the pipe.
-    """
+    """Write a message between a pool and its workers as a pickle, which ends by itself."""
     stream.write(pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL))
     stream.flush()
 
 
 def receive(stream: IO[bytes]) -> Any:
-    """Read a message.
-
-    Raises:
-        EOFError: the process at the other end has closed the pipe.
-    """
+    """Read a message; EOFError if the process at the other end has closed the pipe."""
     try:
         return pickle.load(stream)
     except pickle.UnpicklingError as error:  # it was killed while it wrote

@@ -34,10 +34,10 @@ import numpy as np
 from optisense.array_types import FloatArray
 from optisense.errors import SearchError
 from optisense.search.evaluation.evaluator import RELIGHTS, DesignEvaluator, Evaluator
+from optisense.search.evaluation.models import SameMirrors, may_change_view
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.evaluation.relit import RelitEvaluator
 from optisense.search.evaluation.requirements import Requirement
-from optisense.search.evaluation.views import SameMirrors, may_change_view
 from optisense.search.methods._augmented_lagrangian import (
     CONDITION_TOLERANCE,
     ROUNDS,
@@ -75,9 +75,8 @@ ascent needs tens of trials and not hundreds.
 """
 
 CONVERGED = 1e-4
-"""Smallest gain of a step, absolute or, for scores above 1, relative; a step that gains less ends
-the ascent. Smaller gains are within the jumps of true scores (an AOAP of 320 rays has an error of
-about 3e-4).
+"""Smallest gain of a step, absolute or, for scores above 1, relative, that does not end the ascent.
+Smaller gains are within the jumps of true scores: an AOAP of 320 rays has an error of about 3e-4.
 """
 
 
@@ -120,8 +119,7 @@ class Gradient(Method):
         self._starts = _starts(problem, starts)
         self.source, self.parts = source_of(problem)
         self._differences = TrialDifferences(problem, self.requirements)
-        span = self.space.upper - self.space.lower
-        self._start_unit = np.clip((self.space.start - self.space.lower) / span, 0.0, 1.0)
+        self._start_unit = self._unit(self.space.start)
         self._known: dict[bytes, Outcome] = {}
         self._region: FeasibleRegion | None = None
         self._places: dict[bytes, FeasiblePoint] = {}
@@ -131,10 +129,7 @@ class Gradient(Method):
         """Return a budget that is usually enough to converge; for ray derivatives and relit
         pictures it does not depend on the number of parameters.
         """
-        turns_rays = not all(RELIGHTS.search(name) for name in space.names) and may_change_view(
-            space.names
-        )
-        if turns_rays or all(RELIGHTS.search(name) for name in space.names):
+        if all(map(RELIGHTS.search, space.names)) or may_change_view(space.names):
             return DEFAULT_BUDGET
         return DEFAULT_STEPS * (2 * space.size + 1)
 
@@ -155,14 +150,12 @@ class Gradient(Method):
 
     def ask(self) -> FloatArray:
         """Return the next points (k, n) that L-BFGS-B needs; none when all ascents converged."""
-        space = self.space
         try:
             for start in self._starts:
-                unit = (start - space.lower) / (space.upper - space.lower)
-                self._climb(np.clip(unit, 0.0, 1.0))
+                self._climb(self._unit(start))
         except PointsWantedError as wanted:
             return wanted.points
-        return np.empty((0, space.size))
+        return np.empty((0, self.space.size))
 
     def _climb(self, unit: FloatArray) -> None:
         """Ascend from a point (n,), in units of the ranges, until its conditions are met. This and
@@ -264,28 +257,28 @@ class Gradient(Method):
             raise PointsWantedError(point[None])
         if outcome.gradient is None:
             return None
-        span = self.space.upper - self.space.lower
         facts = outcome.parts[self.objective]
         values = np.array([facts[SMOOTHED], *facts.get(LIMITED, [])])
-        return LocalValues(values, outcome.gradient.reshape(len(values), -1) * span)
+        return LocalValues(values, outcome.gradient.reshape(len(values), -1) * self.space.span)
 
     def _placed(self, unit: FloatArray, allowed: FloatArray) -> FeasiblePoint:
         """Return the nearest feasible point to a wanted one (n,), which is scored in its place."""
+        if self._region is None:
+            return FeasiblePoint.unchanged(unit)
         key = unit.tobytes()
         if key not in self._places:
-            if self._region is None:
-                self._places[key] = FeasiblePoint.unchanged(unit)
-            else:
-                self._places[key] = self._region.nearest(unit, allowed)
+            self._places[key] = self._region.nearest(unit, allowed)
         return self._places[key]
+
+    def _unit(self, point: FloatArray) -> FloatArray:
+        """Return a point (n,) in units of the ranges."""
+        return np.clip(self.space.to_unit(point), 0.0, 1.0)
 
     def _point(self, unit: FloatArray) -> FloatArray:
         """Return the point (n,) for units of the ranges; the start, which is scored already,
         unrounded.
         """
-        space = self.space
-        point = np.clip(space.lower + unit * (space.upper - space.lower), space.lower, space.upper)
-        return np.where(unit == self._start_unit, space.start, point)
+        return np.where(unit == self._start_unit, self.space.start, self.space.from_unit(unit))
 
     def tell(self, vectors: FloatArray, outcomes: Sequence[Outcome]) -> None:
         """Store the outcomes of a generation (k, n), with their gradients, by their points."""
@@ -334,4 +327,4 @@ def _starts(problem: Problem, count: int) -> FloatArray:
     space = problem.space
     cube = qmc.LatinHypercube(space.size, seed=problem.random("gradient"))
     spread = cube.random(count - 1)
-    return np.concatenate([space.start[None], space.lower + spread * (space.upper - space.lower)])
+    return np.concatenate([space.start[None], space.lower + spread * space.span])

@@ -18,7 +18,7 @@ from optisense.json_values import json_ready
 from optisense.objectives.score import deviation_of
 from optisense.search.evaluation.evaluator import DesignEvaluator, Goal, as_goals
 from optisense.search.evaluation.outcome import Outcome
-from optisense.search.evaluation.robust import HIGH, LOW, MIDDLE
+from optisense.search.evaluation.robust import PERCENTILES
 from optisense.search.executors import Runner, Workers, create_runner
 from optisense.search.executors.base import run_jobs
 from optisense.search.space.manufacturing import ManufacturingErrors, ToleranceDistribution
@@ -51,8 +51,6 @@ OWN_SCORES = 1 + NOISE_SEEDS
 MOST_NOISE_SHARE = 0.25
 """Share of the noise in the variance above which the shares of errors count as unknown: noise of
 half the standard deviation adds as much to each share, whatever the error does."""
-
-PERCENTILES = {"p10": LOW, "p50": MIDDLE, "p90": HIGH}
 
 POSITION, ANGLE, SPECULARITY, CAGE_POINT, INDEX = 0.1, 2.0, 0.05, 0.05, 0.005
 """Default standard deviations of errors: of each light's position (mm) and direction (degrees about
@@ -220,7 +218,8 @@ def tolerance(
     bound = making.bind(design)
     goals = as_goals(objective)
     evaluator = DesignEvaluator(bound.space, goals, settings, keeps=False, variant=variant)
-    count, rows = _columns(making), _rows(making, sensors)
+    count = 1 if len(making.sources) == 1 else 1 + len(making.sources)
+    rows = max(LEAST_ROWS, round(sensors / count))
     points = bound.points(paired_errors(bound, rows, seed))
     nominal = bound.points(np.zeros(bound.size))
     jobs = [(nominal, each) for each in (seed, *fresh_seeds(seed, NOISE_SEEDS))]
@@ -260,14 +259,6 @@ def tolerance(
     )
 
 
-def _columns(errors: ManufacturingErrors) -> int:
-    return 1 if len(errors.sources) == 1 else 1 + len(errors.sources)
-
-
-def _rows(errors: ManufacturingErrors, sensors: int) -> int:
-    return max(LEAST_ROWS, round(sensors / _columns(errors)))
-
-
 def _score_distribution(
     name: str,
     repeats: Sequence[Outcome],
@@ -282,13 +273,15 @@ def _score_distribution(
         source: total_effect(values, number) if rows_are_whole and shape[0] else None
         for number, source in enumerate(sources)
     }
-    order = sorted(shares, key=lambda source: -_size(shares[source]))
+    largest_first = sorted(
+        shares.items(), key=lambda each: -1.0 if each[1] is None else each[1].value, reverse=True
+    )
     return ScoreDistribution(
         nominal=float(same[0]),
         noise=deviation_of(same[np.isfinite(same)].tolist()),
         scores=values,
         percentiles={key: percentile_of(values, share) for key, share in PERCENTILES.items()},
-        shares={source: shares[source] for source in order},
+        shares=dict(largest_first),
     )
 
 
@@ -314,10 +307,6 @@ def _work(
     except KeyboardInterrupt:
         return found, True
     return found, False
-
-
-def _size(share: Estimate | None) -> float:
-    return -1.0 if share is None else share.value
 
 
 def _plain(each: ScoreDistribution) -> dict[str, Any]:

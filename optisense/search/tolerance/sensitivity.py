@@ -80,14 +80,9 @@ def percentile_of(scores: ArrayLike, share: float) -> Estimate:
 
 
 def total_effect(scores: ArrayLike, source: int) -> Estimate | None:
-    """Return the share of one source in the variance, or None if too few pairs have scores.
-
-    Args:
-        scores: scores (rows, 1 + sources) of the sensors of `paired_errors`, NaN where one failed.
-        source: index of the source.
-
-    Returns:
-        The share, clipped to at most 1, with the standard error of the unclipped estimate.
+    """Return the share of one source in the variance, with the standard error of the unclipped
+    estimate, or None if too few pairs of scores (rows, 1 + sources) of the sensors of
+    `paired_errors` are known; NaN where a sensor failed.
     """
     values = np.asarray(scores, dtype=np.float64)
     if values.shape[1] == 1:
