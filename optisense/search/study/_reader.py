@@ -48,24 +48,21 @@ class Reader:
     @contextmanager
     def connected(self) -> Iterator[sqlite3.Connection]:
         """Yield a connection for the duration of the block."""
-        while (stamp := self._stamp())[2] == 0:
-            if self._memory is not None and self._memory[0] == stamp:
-                yield self._memory[1]
-                return
-            memory = _in_memory(self._path.read_bytes())
-            if self._stamp() == stamp:  # else somebody has begun to write to it meanwhile
-                self._memory = stamp, memory
-        if self._memory is not None and self._memory[0] == stamp:
-            yield self._memory[1]
+        stamp = self._stamp()
+        while self._memory is None or self._memory[0] != stamp:
+            if stamp[2] == 0:
+                self._memory = stamp, _in_memory(self._path.read_bytes())
+                stamp = self._stamp()  # another one if somebody has begun to write meanwhile
+                continue
+            try:
+                live = self._live()
+            except sqlite3.OperationalError:
+                self._memory = stamp, self._merged()
+                break
+            with closing(live):
+                yield live
             return
-        try:
-            live = self._live()
-        except sqlite3.OperationalError:
-            self._memory = stamp, self._merged()
-            yield self._memory[1]
-            return
-        with closing(live):
-            yield live
+        yield self._memory[1]
 
     def _stamp(self) -> Stamp:
         """Return the state of the file."""

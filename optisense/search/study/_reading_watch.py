@@ -31,12 +31,14 @@ than a tenth of the search."""
 class ReadingWatch:
     """Reads the start and the best design so far of a study, and stores that with their trials."""
 
-    def __init__(self, study: Study, tally: Tally, usual: DesignEvaluator) -> None:
-        """Store the study and its evaluator of plain scores; nothing is read yet."""
+    def __init__(self, study: Study, tally: Tally, usual: DesignEvaluator, *, front: bool) -> None:
+        """Store the study, which is not read if it has a `front`, and its evaluator of plain
+        scores.
+        """
         self._study, self._tally, self._usual = study, tally, usual
         texts = [goal for goal in usual.goals if isinstance(goal, str)]
         texts += [each.quantity for each in usual.requirements]
-        self._wanted = usual.renders and READING not in named_in(texts)
+        self._wanted = not front and usual.renders and READING not in named_in(texts)
         self._began = time.monotonic()
         self._due = self._began + FIRST_SECONDS
         self._reader: DesignEvaluator | None = None

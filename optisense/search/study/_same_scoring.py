@@ -22,10 +22,9 @@ from optisense.search.space.search_space import BoundSpace
 from optisense.search.study.settings import ONLY_HERE, StudySettings
 
 SCORING = 1
-"""Version of how scores and limited quantities follow from a design, the settings and a seed. It
-grows when a release changes one of them by more than rounding. Studies store it; those of releases
-that did not have 0, from before 2to3PW and distortion left out triangles between different
-reflections."""
+"""Version of how scores and limited quantities follow from a design, the settings and a seed, which
+grows when a release changes one of them by more than rounding. Studies that store none have 0, from
+before 2to3PW and distortion left out triangles between different reflections."""
 
 SAME_SCORE = 1e-3
 """Largest relative difference between scores of the same definition. A shadow ray that rounding

@@ -39,17 +39,14 @@ class Tally:
         self.scored: dict[bytes, Outcome] = {}
         self._objective = objective
         self._nearest: Outcome | None = None
-        self._best_outcome: Outcome | None = None
-        self._start_outcome: Outcome | None = None
-        self._best_number = self._start_number = -1
+        self._leading: dict[str, tuple[int, Outcome]] = {}
         self._reasons: dict[str, list[str]] = {}
 
     def count(self, row: Row, outcome: Outcome) -> None:
         """Count a finished trial; SearchError if the first trials all failed."""
         score = outcome.scores.get(self._objective, math.nan)
         if row.generation == START:
-            self.start, self._start_outcome = score, outcome
-            self._start_number = row.number
+            self.start, self._leading["start"] = score, (row.number, outcome)
         else:
             self.done += 1
             self.failed += outcome.failed
@@ -59,8 +56,7 @@ class Tally:
         if not outcome.failed:
             self.scored[row.vector.tobytes()] = outcome
             if outcome.is_feasible and not score <= self.best:
-                self.best, self._best_outcome = score, outcome
-                self._best_number = row.number
+                self.best, self._leading["best"] = score, (row.number, outcome)
             if self._nearest is None or outcome.violation < self._nearest.violation:
                 self._nearest = outcome
         enough = ALL_FAIL_WITH_START if math.isnan(self.start) else ALL_FAIL
@@ -83,7 +79,7 @@ class Tally:
 
     def _way_out(self) -> str:
         """Return what to do if no trial has a score."""
-        start = self._start_outcome
+        start = self._leading["start"][1] if "start" in self._leading else None
         causes = [each[0] for each in self._reasons.values()]
         if start is None or start.failure is None or not all(map(is_defect, causes)):
             return (
@@ -102,17 +98,15 @@ class Tally:
 
     def leading(self) -> list[tuple[int, Outcome]]:
         """Return numbers and outcomes of the start and of the best trial, if that is better."""
-        best, start = self._best_outcome, self._start_outcome
-        if best is None or start is None or start.failed or not self.best > self.start:
-            return []
-        return [(self._start_number, start), (self._best_number, best)]
+        if not self.best > self.start or self._leading["start"][1].failed:
+            return []  # one of the two is NaN if it has no score
+        return [self._leading["start"], self._leading["best"]]
 
     def replace(self, number: int, outcome: Outcome) -> None:
         """Replace the outcome of the start or of the best trial by one with further parts."""
-        if number == self._start_number:
-            self._start_outcome = outcome
-        if number == self._best_number:
-            self._best_outcome = outcome
+        for name, (known, _) in self._leading.items():
+            if known == number:
+                self._leading[name] = number, outcome
 
     def worsened(self) -> dict[str, str]:
         """Return the watched quantities that are worse in the best trial so far than in the start,

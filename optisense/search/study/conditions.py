@@ -55,10 +55,8 @@ def _result(text: str, value: float | None, before: float | None = None) -> Cond
 
 
 def unmet(conditions: Mapping[str, float | None]) -> list[str]:
-    """Return the conditions that are broken, each with its value: ``coverage >= 0.6 (is 0.52)``.
-
-    Args:
-        conditions: value of the limited quantity, by the text of each condition.
+    """Return the conditions, by their text, that are broken by values of limited quantities, each
+    with its value: ``coverage >= 0.6 (is 0.52)``.
     """
     results = [_result(text, value) for text, value in conditions.items()]
     return [f"{each.text} (is {shown(each.value)})" for each in results if not each.met]
@@ -97,11 +95,8 @@ def is_worse(now: float, before: float, *, lower_is_better: bool) -> bool:
 
 
 def worsened(best: Outcome, start: Outcome) -> dict[str, tuple[float, float]]:
-    """Return the quantities without a condition that are worse in the best outcome than in the
-    start, by the name of the objective.
-
-    Returns:
-        The value of the best and that of the start, if the best's is worse by `WORSE`.
+    """Return the values in the best outcome and in the start of quantities without a condition that
+    are worse in the best one by `WORSE`, by the name of the objective.
     """
     limited = {Requirement.parse(text).quantity for text in best.conditions}
     before, now = start.parts.get(WATCHED, {}), best.parts.get(WATCHED, {})

@@ -55,10 +55,8 @@ def cause_of(reason: str) -> str:
 
 
 def by_cause(failures: Iterable[tuple[int, str]]) -> list[FailureCause]:
-    """Group failures by cause, the most frequent cause first.
-
-    Args:
-        failures: number of each failed trial, and its reason.
+    """Group failures, numbers of trials and their reasons, by cause, the most
+    frequent cause first.
     """
     found: dict[str, FailureCause] = {}
     for number, reason in failures:

@@ -51,10 +51,8 @@ def save_and_reload(folder: Path, design: SensorDesign) -> SensorDesign:
 
 
 def unedited_design(folder: Path, settings: StudySettings, store: Store) -> SensorDesign:
-    """Return the study's own design, after a check that neither it nor the settings were edited.
-
-    Raises:
-        SearchError: the design or the settings were edited; the message says which.
+    """Return the study's own design; SearchError if it or the settings were edited, which tells
+    how.
     """
     if store.fact("settings") != settings.fingerprint_of_all():
         begun = store.fact("study")

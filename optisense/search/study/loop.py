@@ -59,16 +59,9 @@ class StudyRun:
         limit: int | None = None,
         variant: str = "auto",
     ) -> None:
-        """Set up the run; nothing is scored yet.
-
-        Args:
-            study: new study, or one that was stopped.
-            make_runner: function that returns the executor of the trials.
-            progress: function that is called a few times a second.
-            limit: largest number of trials; the largest that was asked for so far if None.
-
-        Raises:
-            OptiSenseError: the study can't be run here.
+        """Set up the run of a study, with a function that returns the executor of its trials, and
+        one that is called a few times a second; nothing is scored yet. `limit` is the largest
+        number of trials: the largest that was asked for so far if None.
         """
         self.study = study
         settings = study.settings
@@ -88,7 +81,7 @@ class StudyRun:
         self._progress = progress or (lambda progress: None)
         self._notes: list[str] = []
         self._tally = Tally(study.objective)
-        self._watch = ReadingWatch(study, self._tally, usual)
+        self._watch = ReadingWatch(study, self._tally, usual, front=self.method.multi_objective)
         self._last_report = time.monotonic()
         self._stage = START_STAGE
         self._time_left = TimeLeft(1)
@@ -120,7 +113,7 @@ class StudyRun:
                 self._score_start(runner)
                 self._begin(TRIALS, self.limit, self._tally.done)
                 ended = self._search(runner)
-                self._watch_reading(last=True)
+                self._watch.update(last=True)
                 self._report(now=True)
                 if not self._coarse:
                     self._begin(FRESH, 0)
@@ -179,7 +172,7 @@ class StudyRun:
             outcomes = [row.outcome for row in whole if row.outcome is not None]
             self.method.tell(np.array([row.vector for row in whole]), outcomes)
             generation = self._generations = generation + 1
-            self._watch_reading()
+            self._watch.update()
 
     def _ask(self) -> FloatArray:
         """Return the next generation (k, n) of the method. Coordinates that miss a bound or a whole
@@ -201,9 +194,7 @@ class StudyRun:
             message = f"the method {name} proposes {told} instead of points (k, {space.size})"
             raise SearchError(message, hint=hint) from None
         near = np.clip(np.where(space.discrete, np.round(asked), asked), space.lower, space.upper)
-        rounded = (near != asked) & (
-            np.abs(near - asked) <= SAME_POINT * (space.upper - space.lower)
-        )
+        rounded = (near != asked) & (np.abs(near - asked) <= SAME_POINT * space.span)
         points = np.where(rounded, near, asked)
         for point in points:
             try:
@@ -212,11 +203,6 @@ class StudyRun:
                 message = f"the method {name} proposes a point outside the space: {error.message}"
                 raise SearchError(message, where=error.where, hint=hint) from None
         return points
-
-    def _watch_reading(self, *, last: bool = False) -> None:
-        """Read the best design so far, unless the method looks for a front."""
-        if not self.method.multi_objective:
-            self._watch.update(last=last)
 
     def _check_definitions(self, runner: Runner) -> None:
         """Score the first finished trial of an earlier release again; SearchError if it scores
@@ -287,9 +273,8 @@ class StudyRun:
         if not rows or self._notes:
             return
         stored = np.array([row.vector for row in rows])
-        span = self.study.space.upper - self.study.space.lower
-        fewer = len(asked) < len(stored)
-        if not fewer and (np.abs(asked[: len(stored)] - stored) <= SAME_POINT * span).all():
+        allowed = SAME_POINT * self.study.space.span
+        if len(asked) >= len(stored) and ((np.abs(asked[: len(stored)] - stored) <= allowed).all()):
             return
         then, now = self.study.settings.versions, package_versions()
         changed = [

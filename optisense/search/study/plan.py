@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from optisense.design import SensorDesign
@@ -24,13 +23,12 @@ from optisense.search.space.manufacturing import SAMPLES, ManufacturingErrors
 from optisense.search.space.search_space import SearchSpace
 from optisense.search.study._same_scoring import SCORING, packages_of
 from optisense.search.study.settings import ONLY_HERE, StudySettings
+from optisense.search.study.trust import file_of
 from optisense.untrusted_files import MOST_PROGRAM, read_bytes
 
 RAYS_ACROSS = 320
-"""Number of chief rays across the image unless `ray_resolution` is given: a quarter of the rays
-that a single evaluation traces. Over shapes of GelSight Svelte's mirror they rank alike (Spearman
-0.99) and AOAP differs by 0.0001 +- 0.0002.
-"""
+"""Number of chief rays across the image unless `ray_resolution` is given: a quarter of the rays of
+a single evaluation. Over shapes of GelSight Svelte's mirror both rank alike (Spearman 0.99)."""
 
 
 @dataclass(frozen=True)
@@ -164,10 +162,8 @@ def rule_reference(rule: Constraint) -> str:
 
 
 def known_goals(settings: StudySettings, given: Sequence[Goal] | None) -> list[Goal]:
-    """Return the goals of a stored study, or none if one of them is not known in this process.
-
-    Raises:
-        SearchError: the given goals are not those of the study.
+    """Return the goals of a stored study, or none if one of them is not known in this process;
+    SearchError if the given goals are not those of the study.
     """
     if given:
         names = [goal_name(goal) for goal in given]
@@ -190,9 +186,8 @@ def known_rules(settings: StudySettings, given: Sequence[Constraint] | None) -> 
 
 def file_prints(references: Sequence[str]) -> dict[str, str]:
     """Return the SHA-256 of each user's Python file that is named, by its path."""
-    paths = [each.rpartition(":")[0] or each for each in references]
     return {
-        path: hashlib.sha256(read_bytes(Path(path), MOST_PROGRAM, SearchError)).hexdigest()
-        for path in paths
-        if path.endswith(".py") and Path(path).is_file()
+        str(file): hashlib.sha256(read_bytes(file, MOST_PROGRAM, SearchError)).hexdigest()
+        for file in filter(None, map(file_of, references))
+        if file.is_file()
     }

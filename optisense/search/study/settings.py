@@ -6,7 +6,6 @@ import hashlib
 import json
 from dataclasses import asdict, dataclass, field, fields
 from datetime import UTC, datetime
-from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -131,11 +130,7 @@ class StudySettings:
         }
 
     def save(self, folder: Path) -> None:
-        """Write study.json; the file appears whole.
-
-        Raises:
-            OutputError: the file can't be written.
-        """
+        """Write study.json; the file appears whole."""
         write_text(folder / STUDY_FILE, self.to_text(), "the study")
 
     @staticmethod
@@ -155,40 +150,32 @@ class StudySettings:
         data = read_json(path, SearchError)
         if not isinstance(data, dict):
             raise SearchError("the study is no JSON object", where=str(path), hint=COPY_AGAIN)
-        found = data.pop("study_version", None)
-        if found != STUDY_VERSION or isinstance(found, bool):
-            newer = isinstance(found, int) and found > STUDY_VERSION
-            raise SearchError(
-                f"the study has version {brief(repr(found))}; this release reads {STUDY_VERSION}",
-                where=str(path),
-                hint="A newer release wrote it: update OptiSense Studio" if newer else COPY_AGAIN,
-            )
-        missing = {name for name in _fields() if name not in data} - set(OPTIONAL)
+        refuse_other_version("study", data.pop("study_version", None), STUDY_VERSION, path)
+        missing = {each.name for each in fields(StudySettings)} - data.keys() - set(OPTIONAL)
         if missing:
             names = ", ".join(sorted(missing))
             raise SearchError(f"{names} is missing", where=str(path), hint=COPY_AGAIN)
         try:
-            settings = _schema().validate_json(json.dumps(data))  # the values as JSON has them
+            schema = TypeAdapter(StudySettings)
+            settings = schema.validate_json(json.dumps(data))  # the values as JSON has them
         except ValidationError as error:
             raise SearchError(first_problem(error), where=str(path), hint=COPY_AGAIN) from None
-        if len(set(settings.names)) != len(settings.objectives):
-            raise SearchError(
-                f"'names' has {len(set(settings.names))} names for {len(settings.objectives)} "
-                "objectives",
-                where=str(path),
-                hint=COPY_AGAIN,
-            )
+        different, count = len(set(settings.names)), len(settings.objectives)
+        if different != count:
+            problem = f"'names' has {different} names for {count} objectives"
+            raise SearchError(problem, where=str(path), hint=COPY_AGAIN)
         return settings
 
 
-@cache
-def _schema() -> TypeAdapter[StudySettings]:
-    """Return the schema of study.json, without its version."""
-    return TypeAdapter(StudySettings)
-
-
-def _fields() -> list[str]:
-    return [each.name for each in fields(StudySettings)]
+def refuse_other_version(what: str, found: object, known: int, path: Path) -> None:
+    """Raise SearchError if a file has another version than the one that this release reads."""
+    if found != known or isinstance(found, bool):
+        newer = isinstance(found, int) and found > known
+        raise SearchError(
+            f"the {what} has version {brief(repr(found))}; this release reads {known}",
+            where=str(path),
+            hint="A newer release wrote it: update OptiSense Studio" if newer else COPY_AGAIN,
+        )
 
 
 def package_versions() -> dict[str, str]:

@@ -25,6 +25,7 @@ from optisense.errors import OutputError, SearchError
 from optisense.objectives.registry import CONDITIONS
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.study._reader import Reader, damaged, translated_errors
+from optisense.search.study.settings import refuse_other_version
 from optisense.untrusted_files import MOST_STORE, check_size
 
 STORE_VERSION = 1
@@ -126,13 +127,7 @@ class Store:
         with store._read() as db:
             version = db.execute("pragma user_version").fetchone()[0]
             strange = db.execute(_STRANGE).fetchone()
-        if version != STORE_VERSION:
-            newer = version > STORE_VERSION
-            raise SearchError(
-                f"the store has version {version}; this release reads {STORE_VERSION}",
-                where=str(path),
-                hint="A newer release wrote it: update OptiSense Studio" if newer else None,
-            )
+        refuse_other_version("store", version, STORE_VERSION, path)
         if strange is not None:
             # For example a view in place of a table, which may compute for ever.
             raise damaged("the store", path, f"it has a {strange[0]} that is none of a study's")
@@ -156,13 +151,10 @@ class Store:
                 if not _has_conditions(self._writer):
                     self._writer.execute("alter table fresh_scores add column conditions text")
 
-    def close_writer(self) -> None:
-        """Close the file for writing; the write-ahead log is merged into it."""
-        if self.path is not None:
-            self.close()
-
     def close(self) -> None:
-        """Close the file; the content of a store in memory is lost."""
+        """Close the file for writing, into which its write-ahead log is merged; the content of a
+        store in memory is lost.
+        """
         if self._db is not None:
             with translated_errors(self.path):
                 self._db.close()
@@ -207,11 +199,8 @@ class Store:
                 return None if row is None else json.loads(row[0])
 
     def propose(self, generation: int, vectors: FloatArray, place: int = 0) -> None:
-        """Write the points (k, n) of a generation, all in one commit.
-
-        Args:
-            vectors: points (k, n).
-            place: index of the first point within the generation.
+        """Write the points (k, n) of a generation, the first of which has the index `place` in it,
+        all in one commit.
         """
         first = self._count("select coalesce(max(number) + 1, 0) from trials")
         rows = [

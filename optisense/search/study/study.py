@@ -176,13 +176,8 @@ class Study:
         return study
 
     def expect(self, wanted: Mapping[str, Any]) -> None:
-        """Refuse to resume the study with other settings than those that it was begun with.
-
-        Args:
-            wanted: fields of `StudySettings` as JSON-ready values.
-
-        Raises:
-            SearchError: some differ; the message lists them.
+        """Refuse to resume the study with other settings than those that it was begun with; the
+        error lists those fields of `StudySettings` that differ.
         """
         here = json.loads(self.settings.to_text())
         changed = plain_differences({key: here[key] for key in wanted}, wanted)
@@ -357,7 +352,7 @@ class Study:
     def unlock(self) -> None:
         """Release the lock; the study can still be read."""
         if self._lock is not None:
-            self.store.close_writer()
+            self.store.close()
             self._lock.release()
             self._lock = None
 
@@ -370,15 +365,12 @@ class Study:
         self.store.close()
         if self._lock is not None:
             self._lock.undo()
-            self._lock.release()
-            self._lock = None
+        self.unlock()
 
     def close(self) -> None:
         """Close its files; a study in memory is lost."""
         self.store.close()
-        if self._lock is not None:
-            self._lock.release()
-            self._lock = None
+        self.unlock()
 
 
 def beside(study: Study, trial: Trial) -> dict[str, float]:

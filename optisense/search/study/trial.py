@@ -99,8 +99,7 @@ class Trial:
 
     def fresh_score(self, objective: str | None = None) -> float:
         """Return the mean score over the fresh seeds; NaN if there are none or one failed."""
-        name = objective or self.objective
-        values = [outcome.scores.get(name, math.nan) for outcome in self.fresh.values()]
+        values = self._fresh_scores(objective)
         return float(np.mean(values)) if values else math.nan
 
     @property
@@ -114,9 +113,12 @@ class Trial:
 
     def fresh_spread(self, objective: str | None = None) -> float:
         """Return the standard deviation over the fresh seeds; NaN if there are less than two."""
-        name = objective or self.objective
-        values = [outcome.scores.get(name, math.nan) for outcome in self.fresh.values()]
+        values = self._fresh_scores(objective)
         return deviation_of(values) if np.isfinite(values).all() else math.nan
+
+    def _fresh_scores(self, objective: str | None) -> list[float]:
+        name = objective or self.objective
+        return [outcome.scores.get(name, math.nan) for outcome in self.fresh.values()]
 
 
 def _mean(values: Sequence[float | None]) -> float | None:
