@@ -16,7 +16,7 @@ from optisense.design import SensorDesign
 from optisense.errors import SearchError, UnknownPartError
 from optisense.objectives.evaluation import Evaluation
 from optisense.objectives.registry import WATCHED, forgetting, objective
-from optisense.search import SearchSpace, Study, search
+from optisense.search import SearchResult, SearchSpace, Study, search
 from optisense.search.evaluation.evaluator import DesignEvaluator
 from optisense.search.evaluation.outcome import FAILED, Outcome, rank_of
 from optisense.search.evaluation.requirements import Requirement, requirements_of
@@ -37,6 +37,12 @@ from optisense.search.study.trial import Trial
 
 RAYS: dict[str, Any] = {"ray_resolution": (64, 48)}
 FOV = {"camera.fov": (40.0, 60.0, 6)}
+
+
+def searched(design: SensorDesign, goal: Any = "aoap", **given: Any) -> SearchResult:
+    """The result of a grid search over the field of view, unless other arguments are given."""
+    usual = {"space": FOV, "method": "grid", "settings": RAYS if isinstance(goal, str) else None}
+    return search(design, objective=goal, **{**usual, **given})
 
 
 def outcome(score: float, **conditions: float) -> Outcome:
@@ -161,44 +167,27 @@ def test_a_trial_that_breaks_a_condition_is_never_the_best(
 @pytest.mark.parametrize("method", ["grid", "random", "cma-es"])
 def test_the_best_of_a_search_keeps_the_condition(mini: SensorDesign, method: str) -> None:
     """A narrow field of view looks straight at the skin, but sees less of it."""
-    free = search(mini, FOV, "aoap", method=method, budget=6, settings=RAYS)
+    free = searched(mini, method=method, budget=6)
     assert free.best.parts["aoap"]["coverage"] < 0.4
-    kept_ = search(
-        mini, FOV, "aoap", method=method, budget=6, settings=RAYS, require="coverage >= 0.5"
-    )
-    assert kept_.best.is_feasible
     limit = "coverage >= 0.5"
-    assert (kept_.best.conditions[limit] or 0.0) >= 0.5
-    fine = [trial for trial in kept_.trials if (trial.conditions[limit] or 0.0) >= 0.5]
-    assert kept_.best.score == max(trial.score for trial in fine)
+    result = searched(mini, method=method, budget=6, require=limit)
+    assert result.best.is_feasible
+    assert (result.best.conditions[limit] or 0.0) >= 0.5
+    fine = [trial for trial in result.trials if (trial.conditions[limit] or 0.0) >= 0.5]
+    assert result.best.score == max(trial.score for trial in fine)
 
 
 def test_a_front_holds_no_trial_that_breaks_a_condition(mini: SensorDesign) -> None:
-    result = search(
-        mini,
-        FOV,
-        ["aoap", "coverage"],
-        method="pareto",
-        budget=24,
-        settings=RAYS,
-        options={"population": 8},
-        require=["coverage >= 0.5"],
-    )
+    goals, options = ["aoap", "coverage"], {"population": 8}
+    given: dict[str, Any] = {"method": "pareto", "budget": 24, "settings": RAYS}
+    result = searched(mini, goals, options=options, require=["coverage >= 0.5"], **given)
     assert result.front
     assert all((trial.conditions["coverage >= 0.5"] or 0.0) >= 0.5 for trial in result.front)
 
 
 def test_nothing_that_meets_the_conditions_is_told_with_the_nearest(mini: SensorDesign) -> None:
     seen: list[SearchProgress] = []
-    result = search(
-        mini,
-        FOV,
-        "aoap",
-        method="grid",
-        settings=RAYS,
-        require="coverage >= 0.99",
-        progress=seen.append,
-    )
+    result = searched(mini, require="coverage >= 0.99", progress=seen.append)
     assert result.study.best is None
     assert any("no trial meets all conditions" in note for note in result.notes)
     assert seen[-1].nearest.startswith("coverage >= 0.99 (is 0.")
@@ -211,28 +200,15 @@ def test_nothing_that_meets_the_conditions_is_told_with_the_nearest(mini: Sensor
 def test_a_study_with_conditions_goes_on_and_old_ones_do_too(
     mini: SensorDesign, tmp_path: Path
 ) -> None:
-    out = tmp_path / "study"
-    first = search(
-        mini,
-        FOV,
-        "aoap",
-        method="random",
-        budget=3,
-        settings=RAYS,
-        require="coverage>=0.6",
-        out=out,
-    )
-    again = search(
-        mini, FOV, "aoap", method="random", budget=3, settings=RAYS, require="coverage >= 0.6",
-        out=out, resume=True,
-    )  # fmt: skip
+    given: dict[str, Any] = {"method": "random", "budget": 3, "out": tmp_path / "study"}
+    first = searched(mini, require="coverage>=0.6", **given)
+    again = searched(mini, require="coverage >= 0.6", resume=True, **given)
     assert [t.score for t in again.trials] == [t.score for t in first.trials]
     with pytest.raises(SearchError, match="begun with other settings"):
-        search(mini, FOV, "aoap", method="random", budget=3, settings=RAYS, out=out, resume=True,
-               require="coverage>=0.5")  # fmt: skip
+        searched(mini, require="coverage>=0.5", resume=True, **given)
 
     old = tmp_path / "old"
-    search(mini, FOV, "aoap", method="random", budget=2, settings=RAYS, out=old)
+    searched(mini, method="random", budget=2, out=old)
     path = old / "study.json"
     plain = json.loads(path.read_text())
     for name in LATER:
@@ -257,18 +233,13 @@ def test_a_condition_that_fresh_seeds_break_is_judged_anew(mini: SensorDesign) -
         def wide(design: SensorDesign) -> float:
             return design.camera.fov
 
-        found = search(mini, FOV, wide, method="grid", require="lucky >= 0.5")
+        found = searched(mini, wide, require="lucky >= 0.5")
         assert [trial.outcome.is_feasible for trial in found.trials] == [True] * 7
         assert found.best.values["camera.fov"] == 48.0
         assert found.best.is_feasible and found.best.fresh
         everywhere = {"camera.fov": (50.0, 60.0, 3)}
-        none = search(
-            set_value(mini, "camera.fov", 50.0),
-            everywhere,
-            wide,
-            method="grid",
-            require="lucky >= 0.5",
-        )
+        start = set_value(mini, "camera.fov", 50.0)
+        none = searched(start, wide, space=everywhere, require="lucky >= 0.5")
         assert none.study.best is None
         close = nearest(none.trials)
         assert close is not None and close.fresh
@@ -282,17 +253,11 @@ def test_what_fresh_seeds_say_of_conditions_is_stored(mini: SensorDesign, tmp_pa
         def seeded(evaluation: Evaluation) -> float:
             return float(evaluation.settings.seed % 7)
 
-        found = search(
-            mini,
-            FOV,
-            lambda design: design.camera.fov,
-            method="grid",
-            require="seeded >= -1",
-            out=tmp_path / "study",
-        )
+        out = tmp_path / "study"
+        found = searched(mini, lambda each: each.camera.fov, require="seeded >= -1", out=out)
         best, start = found.best, found.start
         found.study.close()
-        again = Study.open(tmp_path / "study")
+        again = Study.open(out)
         assert again.trial(best.number).conditions == best.conditions != best.outcome.conditions
         assert again.trial("start").conditions == start.conditions
         again.close()
@@ -301,10 +266,9 @@ def test_what_fresh_seeds_say_of_conditions_is_stored(mini: SensorDesign, tmp_pa
 def test_nine_of_ten_manufactured_sensors_meet_a_condition(mini: SensorDesign) -> None:
     """A field of view that is 2 degrees off at random: the best keeps some distance."""
     limit = "coverage >= 0.5"
-    given: dict[str, Any] = {"settings": RAYS, "method": "grid", "require": limit}
-    space = {"camera.fov": (50.0, 56.0, 7)}
-    plain = search(mini, space, "aoap", **given)
-    robust = search(mini, space, "aoap", errors={"camera.fov": 2.0}, samples=12, **given)
+    given: dict[str, Any] = {"space": {"camera.fov": (50.0, 56.0, 7)}, "require": limit}
+    plain = searched(mini, **given)
+    robust = searched(mini, errors={"camera.fov": 2.0}, samples=12, **given)
     assert robust.best.values["camera.fov"] > plain.best.values["camera.fov"]
     made = robust.best.conditions[limit]
     exact = plain.best.conditions[limit]
@@ -312,7 +276,7 @@ def test_nine_of_ten_manufactured_sensors_meet_a_condition(mini: SensorDesign) -
 
 
 def test_a_score_won_by_seeing_less_is_told(mini: SensorDesign) -> None:
-    result = search(mini, FOV, "aoap", method="grid", settings=RAYS)
+    result = searched(mini)
     assert set(result.start.parts[WATCHED]) == {"coverage", "distortion"}
     assert any("--require 'coverage>=" in note for note in result.notes), result.notes
     assert worsened_note(result.start, result.start) is None
@@ -330,14 +294,13 @@ def test_a_score_won_by_reading_worse_is_told(mini: SensorDesign) -> None:
 
 
 def test_lights_alone_are_not_watched(mini: SensorDesign) -> None:
-    space = {"lights.red.flux": (1.0, 2.0, 2)}
-    result = search(mini, space, "aoap", method="grid", settings=RAYS)
+    result = searched(mini, space={"lights.red.flux": (1.0, 2.0, 2)})
     assert WATCHED not in result.start.parts
 
 
 def test_the_start_may_break_a_condition(mini: SensorDesign) -> None:
     narrow = set_value(mini, "camera.fov", 42.0)
-    result = search(narrow, FOV, "aoap", method="grid", settings=RAYS, require="coverage>=0.5")
+    result = searched(narrow, require="coverage>=0.5")
     assert not result.start.is_feasible
     assert result.best.is_feasible
     assert any("which is allowed" in note for note in result.notes)
@@ -362,7 +325,7 @@ def test_an_unknown_part_of_a_users_objective_ends_a_search_before_its_trials(
             return 1.0, {"first": 2.0}
 
         with pytest.raises(UnknownPartError, match="own_parts has no part 'firts'") as told:
-            search(mini, FOV, "aoap", settings=RAYS, require="own_parts.firts >= 0.1")
+            searched(mini, require="own_parts.firts >= 0.1")
     assert told.value.hint == "Did you mean 'first'?"
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -40,9 +40,10 @@ def svelte() -> SensorDesign:
     return gelsight_svelte(tessellation=1.0, m1_grid=(60, 15))
 
 
-def method(design: SensorDesign, objective: str = "aoap", **space: object) -> Gradient:
-    bound = SearchSpace({name.replace("__", "."): v for name, v in space.items()}).bind(design)
-    return Gradient(Problem(bound, (objective,), 10), resolution=RESOLUTION)
+def method(
+    design: SensorDesign, space: Mapping[str, object], objective: str = "aoap", **options: Any
+) -> Gradient:
+    return Gradient(Problem(SearchSpace(space).bind(design), (objective,), 10), **options)
 
 
 def slopes_of(
@@ -73,21 +74,18 @@ def test_slopes_of_svelte_are_the_changes_of_the_smoothed_score(
 ) -> None:
     """The mirror's rays are cut off by the second mirror and the body, too."""
     path = "camera.fov" if name == "fov" else f"cages.M1.{name}"
-    bound = SearchSpace({path: Around(1.0)}).bind(freed(svelte, "M1"))
-    evaluator = slopes_of(Gradient(Problem(bound, ("aoap",), 10)))
-    _, gradient = evaluator.gradient(bound.start)
-    values = [evaluator.gradient(bound.start + way)[0] for way in (step, -step)]
+    found = method(freed(svelte, "M1"), {path: Around(1.0)})
+    evaluator, start = slopes_of(found), found.space.start
+    _, gradient = evaluator.gradient(start)
+    values = [evaluator.gradient(start + way)[0] for way in (step, -step)]
     differences = (values[0] - values[1]) / (2 * step)
     assert gradient[0] == pytest.approx(differences, rel=0.05, abs=2e-5)
 
 
 def test_a_camera_that_blockers_hem_in_has_the_slope_of_the_true_score() -> None:
     """GelSight360, near where a search by derivatives without edges goes the wrong way."""
-    design = load("gelsight360")
-    bound = SearchSpace({"camera.position.z": (0.0, 16.0), "camera.fov": (90.0, 148.0)}).bind(
-        design
-    )
-    evaluator = slopes_of(Gradient(Problem(bound, ("aoap",), 10)), settings=TRUE)
+    space = {"camera.position.z": (0.0, 16.0), "camera.fov": (90.0, 148.0)}
+    evaluator = slopes_of(method(load("gelsight360"), space), settings=TRUE)
     point = np.array([8.0, 118.0])
     _, gradient = evaluator.gradient(point)
     for number, step in enumerate((0.2, 2.0)):
@@ -101,19 +99,13 @@ def test_a_camera_that_blockers_hem_in_has_the_slope_of_the_true_score() -> None
 
 def test_rays_that_leave_the_picture_count_for_nothing_where_the_score_is_flat() -> None:
     """The skin of GelBelt fills the picture: nothing fades at its border."""
-    bound = SearchSpace({"camera.position.x": Around(1.0), "camera.fov": Around(3.0)}).bind(
-        load("gelbelt")
-    )
-    evaluator = slopes_of(Gradient(Problem(bound, ("aoap",), 10), resolution=RESOLUTION))
-    _, gradient = evaluator.gradient(bound.start)
+    space = {"camera.position.x": Around(1.0), "camera.fov": Around(3.0)}
+    evaluator = slopes_of(method(load("gelbelt"), space, resolution=RESOLUTION))
+    _, gradient = evaluator.gradient(evaluator.usual.space.start)
     assert np.abs(gradient).max() < 4e-3
 
 
-CAMERA = {
-    "camera.position": Around(1.0),
-    "camera.turn": Around(3.0),
-    "camera.fov": Around(3.0),
-}
+CAMERA = {"camera.position": Around(1.0), "camera.turn": Around(3.0), "camera.fov": Around(3.0)}
 
 
 class ScoredOnce(ScoreDifferences):
@@ -135,8 +127,7 @@ class ScoredOnce(ScoreDifferences):
 @pytest.fixture(scope="module")
 def belt() -> GradientEvaluator:
     """An evaluator of GelBelt's 2to3PW by its camera. Tests take the same steps from its start."""
-    bound = SearchSpace(CAMERA).bind(load("gelbelt"))
-    evaluator = slopes_of(Gradient(Problem(bound, ("2to3pw",), 10)), "2to3pw", TRUE)
+    evaluator = slopes_of(method(load("gelbelt"), CAMERA, "2to3pw"), "2to3pw", TRUE)
     evaluator._differences = ScoredOnce(evaluator.usual)
     return evaluator
 
@@ -153,8 +144,8 @@ def test_an_unlikely_gradient_does_not_hold_and_a_true_one_does(belt: GradientEv
 
 def test_a_score_that_steps_is_said_to_have_no_steady_derivative() -> None:
     """The coverage in GelBelt's AOAP counts triangles, of which whole rows come into view."""
-    bound = SearchSpace(CAMERA).bind(load("gelbelt"))
-    found = Gradient(Problem(bound, ("aoap",), 10))
+    found = method(load("gelbelt"), CAMERA)
+    bound = found.space
     usual = DesignEvaluator(bound, ["aoap"], apart=False)
     outcome = found.evaluator(usual)(bound.start, 0)
     assert not outcome.parts["aoap"][GRADIENT_HOLDS]
@@ -183,13 +174,9 @@ def test_a_gradient_that_is_said_to_hold_is_within_five_per_cent(belt: GradientE
 
 def test_a_transparent_part_that_moves_is_climbed_by_differences() -> None:
     """The cage of GelSight Mini bends its gel, by which rays have no derivative."""
-    bound = SearchSpace({"cages.skin.points": CagePoints(Around(0.5), points=[4, 13, 14])}).bind(
-        load("gelsight-mini-ideal")
-    )
-    found = Gradient(Problem(bound, ("2to3pw",), 10), resolution=32)
-    usual = DesignEvaluator(bound, ["2to3pw"], {"ray_resolution": (32, 24)}, apart=False)
-    evaluator = found.evaluator(usual)
-    assert isinstance(evaluator, GradientEvaluator)
+    space = {"cages.skin.points": CagePoints(Around(0.5), points=[4, 13, 14])}
+    found = method(load("gelsight-mini-ideal"), space, "2to3pw", resolution=32)
+    evaluator, bound = slopes_of(found, "2to3pw", {"ray_resolution": (32, 24)}), found.space
     assert bound.size > FEW_PARAMETERS
     with pytest.raises(NoDerivativeError, match="gel"):
         evaluator.gradient(bound.start)
@@ -238,19 +225,19 @@ def test_an_ascent_slides_along_the_parts_that_the_mirror_meets() -> None:
 def test_derivatives_that_differences_contradict_at_the_start_are_checked_everywhere(
     svelte: SensorDesign,
 ) -> None:
-    bound = SearchSpace(MIRROR).bind(svelte)
-    point = bound.start + 0.01 * (bound.upper - bound.lower)
     for contradicted in (False, True):
-        evaluator = slopes_of(Gradient(Problem(bound, ("aoap",), 10), resolution=RESOLUTION))
+        evaluator = slopes_of(method(svelte, MIRROR, resolution=RESOLUTION))
         evaluator._contradicted = contradicted
-        parts = evaluator(point, 0).parts["aoap"]
+        space = evaluator.usual.space
+        parts = evaluator(space.start + 0.01 * space.span, 0).parts["aoap"]
         assert (GRADIENT_HOLDS in parts) is contradicted
         if not contradicted:
             assert parts[GRADIENT_BY] == GradientSource.RAYS.value
 
 
 def test_the_same_search_takes_the_same_steps(svelte: SensorDesign) -> None:
-    one, other = (method(svelte, cages__M1__blend=(0, 1)) for _ in range(2))
+    space: dict[str, object] = {"cages.M1.blend": (0, 1)}
+    one, other = (method(svelte, space, resolution=RESOLUTION) for _ in range(2))
     evaluator = slopes_of(one)
     for _ in range(2):
         asked = one.ask()
@@ -322,19 +309,19 @@ def test_scores_without_derivatives_of_rays_may_depend_on_other_numbers(
     mini: SensorDesign,
 ) -> None:
     """The power is traced by no ray, as are functions of the design in a file."""
-    found = method(mini, "power", lights__red__flux=(1.0, 5.0))
+    found = method(mini, {"lights.red.flux": (1.0, 5.0)}, "power")
     assert found.source is GradientSource.TRIALS
 
 
 @pytest.mark.parametrize(
-    ("space", "objective", "message"),
+    ("space", "message"),
     [
-        ({"coating__specularity": (0, 1)}, "aoap", "neither a surface nor the camera"),
-        ({"camera__resolution[0]": (100, 104)}, "aoap", "a whole number has no gradient"),
+        ({"coating.specularity": (0, 1)}, "neither a surface nor the camera"),
+        ({"camera.resolution[0]": (100, 104)}, "a whole number has no gradient"),
     ],
 )
 def test_what_has_no_gradient_is_refused(
-    svelte: SensorDesign, space: dict[str, object], objective: str, message: str
+    svelte: SensorDesign, space: dict[str, object], message: str
 ) -> None:
     with pytest.raises(SearchError, match=message):
-        method(svelte, objective, **space)
+        method(svelte, space)

@@ -14,8 +14,11 @@ from optisense.design import SensorDesign, save_design, set_value
 from optisense.errors import SearchError
 from optisense.objectives.registry import forgetting
 from optisense.quality import TRIAL_PHOTONS
-from optisense.search import Plan, SearchProgress, SearchSpace, Study, search
+from optisense.search import Outcome, Plan, SearchProgress, SearchSpace, Study, search
 from optisense.search._run_search import run_study
+from optisense.search.methods import METHODS, Method, register
+from optisense.search.methods._pareto import Pareto
+from optisense.search.space.constraints import UserRule
 
 SPACE = {"coating.specularity": (0.0, 1.0, 5), "camera.position.x": (-1.0, 3.0, 3)}
 
@@ -34,14 +37,7 @@ def test_finds_the_best_and_makes_its_design(mini: SensorDesign, goals: ModuleTy
     assert mini.coating.specularity == 0.0
 
 
-def test_grid_scores_every_combination(mini: SensorDesign, goals: ModuleType) -> None:
-    result = search(mini, SPACE, goals.nearness, method="grid")
-    assert result.best.values == {"coating.specularity": 0.25, "camera.position.x": 1.0}
-    assert result.ended == "the method has finished"
-    assert len(result.trials) == 1 + 15
-
-
-def test_no_point_is_scored_twice(mini: SensorDesign, goals: ModuleType) -> None:
+def test_no_point_is_scored_twice(mini: SensorDesign) -> None:
     """A grid holds the start; whole numbers and options repeat."""
     asked: list[float] = []
 
@@ -164,42 +160,57 @@ def test_the_same_seed_is_the_same_study(mini: SensorDesign, goals: ModuleType) 
     assert not np.array_equal(vectors(one), vectors(other))
 
 
+class Noisy:
+    """Scores of the specularity, with luck that depends on the seed and the design: "shine", and
+    "dullness", which is its opposite.
+    """
+
+    def __init__(self, names: list[str], spread: float) -> None:
+        self.names, self.spread = names, spread
+
+    def __call__(self, vector: np.ndarray, seed: int) -> Outcome:
+        shine = float(vector[0])
+        luck = np.random.default_rng([seed, int(1e6 * shine)]).normal(0.0, self.spread, 2)
+        both = {"shine": shine + luck[0], "dullness": 1.0 - shine + luck[1]}
+        return Outcome({name: both[name] for name in self.names})
+
+
+def shine(design: SensorDesign) -> float:
+    raise AssertionError("the method brings an evaluator of its own")
+
+
+def dullness(design: SensorDesign) -> float:
+    raise AssertionError("the method brings an evaluator of its own")
+
+
+class NoisyLine(Method):
+    name = "noisy-line"
+    summary = "a test"
+
+    def ask(self) -> np.ndarray:
+        asked, self.asked = getattr(self, "asked", False), True
+        return np.empty((0, 1)) if asked else np.linspace(0.0, 0.2, 60)[:, None]
+
+    def tell(self, vectors: np.ndarray, outcomes: object) -> None:
+        pass
+
+    def evaluator(self, usual: object) -> Noisy:  # type: ignore[override]
+        return Noisy(["shine"], 0.05)
+
+
+class NoisyPareto(Pareto):
+    name = "noisy-pareto"
+
+    def evaluator(self, usual: object) -> Noisy:  # type: ignore[override]
+        return Noisy(["shine", "dullness"], 0.01)
+
+
 def test_the_best_is_scored_again_before_it_is_named(mini: SensorDesign) -> None:
     """Of noisy scores the luckiest is not the best: fresh seeds tell."""
-    from optisense.search import Outcome
-
-    class Noisy:
-        """Scores the specularity, with luck that depends on the seed and the design."""
-
-        def __init__(self, usual: object) -> None:
-            self.usual = usual
-
-        def __call__(self, vector: np.ndarray, seed: int) -> object:
-            luck = np.random.default_rng([seed, int(1e6 * vector[0])]).normal(0.0, 0.05)
-            return Outcome({"brightness": float(vector[0]) + luck})
-
-    def brightness(design: SensorDesign) -> float:
-        raise AssertionError("the method brings an evaluator of its own")
-
-    from optisense.search.methods import Method, register
-
-    class NoisyLine(Method):
-        name = "noisy-line"
-        summary = "a test"
-
-        def ask(self) -> np.ndarray:
-            asked, self.asked = getattr(self, "asked", False), True
-            return np.empty((0, 1)) if asked else np.linspace(0.0, 0.2, 60)[:, None]
-
-        def tell(self, vectors: np.ndarray, outcomes: object) -> None:
-            pass
-
-        def evaluator(self, usual: object) -> Noisy:  # type: ignore[override]
-            return Noisy(usual)
-
-    register(NoisyLine)
     space = {"coating.specularity": (0.0, 1.0)}
-    result = search(mini, space, brightness, method="noisy-line", budget=60, seed=5)
+    with METHODS.forgetting():
+        register(NoisyLine)
+        result = search(mini, space, shine, method="noisy-line", budget=60, seed=5)
     again = [trial for trial in result.trials if trial.fresh and not trial.is_start]
     luckiest = max(result.trials, key=lambda trial: trial.score)
     assert luckiest in again
@@ -229,36 +240,11 @@ def test_several_goals_are_weighed(mini: SensorDesign, goals: ModuleType) -> Non
 
 
 def test_trade_offs_are_scored_again_from_end_to_end(mini: SensorDesign) -> None:
-    from optisense.search import Outcome
-    from optisense.search.methods import register
-    from optisense.search.methods._pareto import Pareto
-
-    class Noisy:
-        """Two opposite scores of the specularity, with luck that depends on seed and design."""
-
-        def __init__(self, usual: object) -> None:
-            self.usual = usual
-
-        def __call__(self, vector: np.ndarray, seed: int) -> object:
-            luck = np.random.default_rng([seed, int(1e6 * vector[0])]).normal(0.0, 0.01, 2)
-            both = float(vector[0]) + luck[0], 1.0 - float(vector[0]) + luck[1]
-            return Outcome(dict(zip(("shine", "dullness"), both, strict=True)))
-
-    class NoisyPareto(Pareto):
-        name = "noisy-pareto"
-
-        def evaluator(self, usual: object) -> Noisy:  # type: ignore[override]
-            return Noisy(usual)
-
-    def shine(design: SensorDesign) -> float:
-        raise AssertionError("the method brings an evaluator of its own")
-
-    def dullness(design: SensorDesign) -> float:
-        raise AssertionError("the method brings an evaluator of its own")
-
-    register(NoisyPareto)
     space = {"coating.specularity": (0.0, 1.0)}
-    result = search(mini, space, [shine, dullness], method="noisy-pareto", budget=80, seed=5)
+    with METHODS.forgetting():
+        register(NoisyPareto)
+        goals = [shine, dullness]
+        result = search(mini, space, goals, method="noisy-pareto", budget=80, seed=5)
     again = [trial for trial in result.front if trial.fresh]
     assert 2 < len(again) < len(result.front)
     assert {result.front[0].number, result.front[-1].number} <= {trial.number for trial in again}
@@ -274,6 +260,11 @@ def test_trade_offs_are_scored_again_from_end_to_end(mini: SensorDesign) -> None
 
 
 class TestResume:
+    @pytest.fixture
+    def folder(self, mini: SensorDesign, goals: ModuleType, tmp_path: Path) -> Path:
+        search(mini, SPACE, goals.nearness, budget=5, out=tmp_path / "study").study.close()
+        return tmp_path / "study"
+
     def test_a_larger_budget_goes_on_where_it_ended(
         self, mini: SensorDesign, goals: ModuleType, tmp_path: Path
     ) -> None:
@@ -304,10 +295,8 @@ class TestResume:
         assert len(log.read_text().splitlines()) == 31 + again
 
     def test_an_edited_design_is_refused_with_the_difference(
-        self, mini: SensorDesign, goals: ModuleType, tmp_path: Path
+        self, mini: SensorDesign, goals: ModuleType, folder: Path
     ) -> None:
-        folder = tmp_path / "study"
-        search(mini, SPACE, goals.nearness, budget=5, out=folder).study.close()
         edited = set_value(mini, "lights.red.flux", 12.0)
         with pytest.raises(SearchError) as told:
             search(edited, SPACE, goals.nearness, budget=5, out=folder, resume=True)
@@ -317,10 +306,8 @@ class TestResume:
             Study.open(folder)
 
     def test_other_settings_are_refused_with_the_difference(
-        self, mini: SensorDesign, goals: ModuleType, tmp_path: Path
+        self, mini: SensorDesign, goals: ModuleType, folder: Path
     ) -> None:
-        folder = tmp_path / "study"
-        search(mini, SPACE, goals.nearness, budget=5, out=folder).study.close()
         wider = {**SPACE, "coating.specularity": (0.0, 0.9, 5)}
         with pytest.raises(SearchError, match=r"specularity.*high: 1 -> 0\.9"):
             search(mini, wider, goals.nearness, budget=5, out=folder, resume=True)
@@ -329,31 +316,23 @@ class TestResume:
         with pytest.raises(SearchError, match="searches for nearness, not for brightness"):
             search(mini, SPACE, goals.brightness, budget=5, out=folder, resume=True)
 
-    def test_only_the_program_knows_its_functions(
-        self, mini: SensorDesign, goals: ModuleType, tmp_path: Path
-    ) -> None:
-        folder = tmp_path / "study"
-        search(mini, SPACE, goals.nearness, budget=5, out=folder).study.close()
+    def test_only_the_program_knows_its_functions(self, folder: Path) -> None:
         study = Study.open(folder)
         assert len(study.trials) == 6
         with pytest.raises(SearchError, match="knows nearness"):
             run_study(study)
 
-    def test_an_edited_file_of_a_user_is_refused(self, mini: SensorDesign, tmp_path: Path) -> None:
+    def test_an_edited_file_of_a_user_is_refused(
+        self, mini: SensorDesign, goals: ModuleType, tmp_path: Path
+    ) -> None:
         rule = tmp_path / "rule.py"
         rule.write_text("def fine(design):\n    return True\n")
-        from optisense.search.space.constraints import UserRule
-
         space = SearchSpace(SPACE, constraints=[UserRule(f"{rule}:fine")])
         folder = tmp_path / "study"
-
-        def score(design: SensorDesign) -> float:
-            return 1.0
-
-        search(mini, space, score, budget=5, out=folder).study.close()
+        search(mini, space, goals.nearness, budget=5, out=folder).study.close()
         rule.write_text("def fine(design):\n    return False\n")
         with pytest.raises(SearchError, match="was edited") as told:
-            run_study(Study.open(folder, goals=[score]))
+            run_study(Study.open(folder, goals=[goals.nearness]))
         assert told.value.where == str(rule)
 
 

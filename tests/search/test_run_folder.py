@@ -131,16 +131,16 @@ class TestFolder:
             Study.open(folder)
         assert "update" in str(told.value.hint)
 
-    def test_a_study_of_a_newer_version_is_refused(self, folder: Path) -> None:
+    @pytest.mark.parametrize(
+        ("name", "value", "said"),
+        [("study_version", 2, "version 2; this release reads 1"), ("seed", 99, "was edited")],
+    )
+    def test_a_newer_or_edited_study_is_refused(
+        self, folder: Path, name: str, value: int, said: str
+    ) -> None:
         path = folder / "study.json"
-        path.write_text(json.dumps({**json.loads(path.read_text()), "study_version": 2}))
-        with pytest.raises(SearchError, match="version 2; this release reads 1"):
-            Study.open(folder)
-
-    def test_an_edited_study_is_refused(self, folder: Path) -> None:
-        path = folder / "study.json"
-        path.write_text(json.dumps({**json.loads(path.read_text()), "seed": 99}))
-        with pytest.raises(SearchError, match="was edited"):
+        path.write_text(json.dumps({**json.loads(path.read_text()), name: value}))
+        with pytest.raises(SearchError, match=said):
             Study.open(folder)
 
     def test_scores_of_earlier_definitions_are_not_mixed_with_new_ones(

@@ -168,14 +168,10 @@ def test_the_interval_of_p10_reaches_to_failed_sensors() -> None:
     assert middle.low < middle.value < middle.high
 
 
-def test_results_are_json(result: Tolerance) -> None:
+def test_results_are_json_and_each_score_has_the_values_that_gave_it(result: Tolerance) -> None:
     again = json.loads(json.dumps(result.to_dict(), allow_nan=False))
     assert again["sensors"] == result.sensors == 2400
     assert again["objectives"]["linear"]["shares"][RED]["value"] > 0.8
-
-
-def test_each_score_has_the_values_that_gave_it(result: Tolerance) -> None:
-    again = result.to_dict()
     assert again["seed"] == 0
     assert again["versions"]["optisense"] == ots.__version__
     assert list(result.names) == list(WEIGHTS)
