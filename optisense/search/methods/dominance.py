@@ -3,56 +3,45 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from optisense.array_types import FloatArray
+from optisense.array_types import BoolArray, FloatArray, IntArray
 
 
-def dominates(values: ArrayLike, broken: ArrayLike | None = None) -> NDArray[np.bool_]:
-    """Return whether i dominates j, (k, k) bool: it is at least as good in all goals and better in
-    one, where higher is better.
-
-    If conditions are broken this is constrained domination (Deb et al., 2002, section VI): the
-    point with the smaller violation dominates.
+def dominates(values: FloatArray, broken: ArrayLike) -> BoolArray:
+    """Return whether i dominates j, (k, k) bool: its violation of the conditions is smaller, or as
+    large and it is at least as good in all goals and better in one, where higher is better
+    (constrained domination: Deb et al., 2002, section VI).
 
     Args:
         values: values of the goals, (k, m); a failed trial has NaN, and all others dominate it.
-        broken: violation of the conditions of each, (k,), 0 where all are met; all are met if None.
+        broken: violation of the conditions of each, (k,), 0 where all are met.
     """
-    given = np.asarray(values, dtype=np.float64)
-    known = np.where(_fine(given)[:, None], given, -np.inf)
+    fine = _fine(values)
+    known, amount = np.where(fine[:, None], values, -np.inf), np.where(fine, broken, np.inf)
     never_worse = (known[:, None] >= known[None]).all(axis=2)
     better = (known[:, None] > known[None]).any(axis=2)
-    found = never_worse & better
-    if broken is not None:
-        amount = np.where(_fine(given), np.asarray(broken, dtype=np.float64), np.inf)
-        less, same = amount[:, None] < amount[None], amount[:, None] == amount[None]
-        found = less | (same & found)
-    return np.asarray(found)
+    less, same = amount[:, None] < amount[None], amount[:, None] == amount[None]
+    return np.asarray(less | (same & never_worse & better))
 
 
-def front(values: ArrayLike) -> NDArray[np.int64]:
+def front(values: FloatArray) -> IntArray:
     """Return the indices of the values (k, m) that no other dominates, in order, without failed
-    ones.
-
-    Duplicates of a value are all kept.
+    ones. Duplicates of a value are all kept.
     """
-    given = np.asarray(values, dtype=np.float64)
-    if not len(given):
-        return np.empty(0, dtype=np.int64)
-    fine = _fine(given)
+    fine = _fine(values)
     kept: list[int] = []
     # After sorting by the first goal a value can be dominated only by values before it.
-    order = np.lexsort(tuple(-given[:, k] for k in reversed(range(given.shape[1]))))
+    order = np.lexsort(-values.T[::-1])
     for number in order[fine[order]]:
-        best = given[kept]
-        worse = (best >= given[number]).all(axis=1) & (best > given[number]).any(axis=1)
+        best = values[kept]
+        worse = (best >= values[number]).all(axis=1) & (best > values[number]).any(axis=1)
         if not worse.any():
             kept.append(int(number))
     return np.array(sorted(kept), dtype=np.int64)
 
 
-def ranks(values: ArrayLike, broken: ArrayLike | None = None) -> NDArray[np.int64]:
+def ranks(values: FloatArray, broken: ArrayLike) -> IntArray:
     """Return the ranks (k,) of values (k, m): 0 for the Pareto front, 1 for the front of the rest,
     and so on (Deb et al., "A fast and elitist multiobjective genetic algorithm: NSGA-II", 2002).
     """
@@ -68,15 +57,14 @@ def ranks(values: ArrayLike, broken: ArrayLike | None = None) -> NDArray[np.int6
     return rank
 
 
-def crowding(values: ArrayLike, rank: NDArray[np.int64]) -> FloatArray:
+def crowding(values: FloatArray, rank: IntArray) -> FloatArray:
     """Return the crowding distance (k,) of each value among those of its rank, infinite at the ends
     (Deb et al., 2002).
     """
-    given = np.asarray(values, dtype=np.float64)
-    room = np.zeros(len(given))
+    room = np.zeros(len(values))
     for level in np.unique(rank):
         members = np.flatnonzero(rank == level)
-        part = given[members]
+        part = values[members]
         if not np.isfinite(part).all():
             continue
         for goal in part.T:
@@ -88,6 +76,6 @@ def crowding(values: ArrayLike, rank: NDArray[np.int64]) -> FloatArray:
     return room
 
 
-def _fine(values: FloatArray) -> NDArray[np.bool_]:
+def _fine(values: FloatArray) -> BoolArray:
     """Return which values have no NaN, (k,) bool."""
     return np.asarray(np.isfinite(values).all(axis=1))
