@@ -20,7 +20,7 @@ from optisense.search.space.search_space import SearchSpace
 RAYS = {"ray_resolution": (40, 30)}
 
 
-def evaluator(name: str, path: str, apart: bool | None = None) -> DesignEvaluator:
+def evaluator(name: str, path: str, apart: bool = True) -> DesignEvaluator:
     """Of a space with one parameter that reaches far."""
     space = SearchSpace({path: (1.0, 4.0) if path.endswith("ior") else (-200.0, 200.0)})
     bound = space.bind(sensors.load(name), tried=False)

@@ -114,17 +114,15 @@ class DesignEvaluator(PickledWithoutCaches):
         settings: Mapping[str, Any] | None = None,
         *,
         requirements: Sequence[str] = (),
-        apart: bool | None = None,
+        apart: bool = True,
         keeps: bool = True,
         variant: str = "auto",
     ) -> None:
         """Check the goals.
 
         Args:
-            goals: one or more; the first is what single-goal methods search for.
-            requirements: conditions as texts, such as "coverage >= 0.55".
             apart: whether designs are forbidden whose parts cut through one another or leave the
-                parts that they rest on; if None, they are where the space moves surfaces.
+                parts that they rest on.
             keeps: whether points must keep the properties of the starting design in `kept`; False
                 for a space of manufacturing errors.
 
@@ -149,7 +147,7 @@ class DesignEvaluator(PickledWithoutCaches):
             else:
                 self._functions[name] = goal
         self.constraints: list[Constraint] = list(space.space.constraints)
-        if space.reshapes and (apart is None or apart):
+        if space.reshapes and apart:
             self.constraints.append(NoCrossings(space.design))
         if any(name.startswith("cages.") for name in space.names):
             self.constraints.append(NoNewProblems(space.design, fold_problems))
@@ -158,7 +156,7 @@ class DesignEvaluator(PickledWithoutCaches):
         self.renders = bool(self._objectives or self.requirements)
         self.kept: list[Constraint] = []
         if keeps:
-            self._add_preserving(apart is None or apart)
+            self._add_preserving(apart)
         self._asks_view = keeps and self.renders and may_change_view(space.names)
         self._watched = self._names_to_watch() if keeps and self.renders else ()
         self.variant = variant
@@ -176,13 +174,8 @@ class DesignEvaluator(PickledWithoutCaches):
     def evaluate(
         self, design: SensorDesign, seed: int, further: Sequence[Constraint] = ()
     ) -> Outcome:
-        """Score any design: one of a point of the space, or one with manufacturing errors.
-
-        Args:
-            further: constraints beside those of `constraints`.
-
-        Raises:
-            SetupError, UnknownPartError: no design can be scored.
+        """Score any design, of a point of the space or with manufacturing errors, under constraints
+        beside those of `constraints`; SetupError or UnknownPartError if no design can be scored.
         """
         began = time.perf_counter()
         try:
@@ -215,11 +208,8 @@ class DesignEvaluator(PickledWithoutCaches):
     def objective_scores(
         self, design: SensorDesign, seed: int, only: Collection[str] | None = None
     ) -> Mapping[str, Score]:
-        """Return the scores by the objectives, without plain functions. Subclasses may override it
-        with a faster way.
-
-        Args:
-            only: names of the objectives to score; all if None.
+        """Return the scores by the objectives, or by those that are named in `only`, without plain
+        functions. Subclasses may override it with a faster way.
         """
         settings = dict(self.used_settings)
         if self._asks_view and "least_skin" not in settings:
@@ -343,10 +333,8 @@ def moved_parts(space: BoundSpace) -> set[str]:
 
 
 def goal_name(goal: Goal) -> str:
-    """Return the name under which the scores of a goal are stored.
-
-    Raises:
-        ObjectiveError: there is no such objective; the message suggests a similar name.
+    """Return the name under which the scores of a goal are stored;
+    ObjectiveError if it is unknown.
     """
     if isinstance(goal, str | Objective):
         return goal_of(goal).name
