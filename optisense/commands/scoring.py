@@ -184,10 +184,8 @@ class SearchOptions(ScoreOptions):
     )
 
     def plan(self) -> Plan:
-        """Return the plan of a new study.
-
-        Raises:
-            SearchError: an option can't be read, or a rule can't be loaded.
+        """Return the plan of a new study; SearchError if an option can't be read or a rule be
+        loaded.
         """
         from optisense.search import Plan, SearchSpace
         from optisense.search.space.constraints import UserRule
@@ -210,11 +208,7 @@ class SearchOptions(ScoreOptions):
         )
 
     def as_stored(self) -> dict[str, Any]:
-        """Return the given options in the form in which a study stores them.
-
-        Raises:
-            SearchError: an option can't be read.
-        """
+        """Return the given options in the form in which a study stores them."""
         from optisense.search import SearchSpace
         from optisense.search.evaluation.requirements import requirements_of
         from optisense.search.space.constraints import UserRule

@@ -52,11 +52,7 @@ MOST_THREADS = 8
 
 
 def usual_seconds(design: SensorDesign, objectives: Iterable[str], trials: int) -> float:
-    """Return the usual duration of a search in one process on this machine, s.
-
-    Raises:
-        ObjectiveError: an objective is unknown.
-    """
+    """Return the usual duration of a search in one process on this machine, s."""
     if are_rays_only(objectives):
         each = RAYS_TIME
     else:

@@ -11,9 +11,6 @@ from optisense.search.study.trial import Trial
 def design_of(study: Study, trial: Trial) -> SensorDesign:
     """Return the design of a trial; values that differ from the study's design are marked as found
     by the study.
-
-    Raises:
-        OptiSenseError: the values do not fit together.
     """
     design = trial.design
     settings = study.settings

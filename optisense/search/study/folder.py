@@ -20,12 +20,8 @@ SQLITE_ENDINGS = ("", "-wal", "-shm", "-journal")
 
 
 def lock_new_folder(folder: Path, design: SensorDesign) -> FolderLock:
-    """Lock a folder for a new study, and record which files it will have.
-
-    Raises:
-        SearchError: there is a study in the folder.
-        FolderInUseError: another process is writing to the folder.
-        OutputError: the folder is not empty, or can't be written.
+    """Lock a folder for a new study, and record which files it will have; an error if it is not
+    empty, has a study, or is in use.
     """
     lock = FolderLock(folder)
     try:

@@ -18,13 +18,13 @@ from optisense.search.evaluation.outcome import Outcome
 from optisense.search.executors import Runner
 from optisense.search.executors.base import TICK, run_jobs
 from optisense.search.methods import Method, Problem, make
-from optisense.search.study._evaluators import evaluators
 from optisense.search.study._reading_watch import ReadingWatch
 from optisense.search.study._same_scoring import SCORING, refuse_other_definitions
 from optisense.search.study._tally import Tally
 from optisense.search.study.advice import moved_start_note
 from optisense.search.study.best import newer_note, tie_note
 from optisense.search.study.conditions import condition_note, worsened_note
+from optisense.search.study.plan import evaluators
 from optisense.search.study.progress import (
     FRESH,
     START_STAGE,
@@ -76,7 +76,7 @@ class StudyRun:
             tuple(settings.requirements),
         )
         self.method: Method = make(settings.method, problem, settings.options)
-        self._evaluator, self._full = evaluators(study, usual, self.method)
+        self._evaluator, self._full = evaluators(settings, usual, self.method)
         self._make_runner = make_runner
         self._progress = progress or (lambda progress: None)
         self._notes: list[str] = []
@@ -91,12 +91,8 @@ class StudyRun:
         self._generations = 0
 
     def run(self) -> SearchResult:
-        """Run to the end, or until Ctrl-C; the caller unlocks the study.
-
-        Raises:
-            FolderInUseError: another process runs this study.
-            SearchError: all trials fail, or an earlier release scored them by other definitions.
-            SetupError, OutputError: no trial can be scored, or written.
+        """Run to the end, or until Ctrl-C; the caller unlocks the study. An error is raised if
+        another process runs it, all trials fail, or no trial can be scored or written.
         """
         study = self.study
         study.lock()
@@ -131,16 +127,14 @@ class StudyRun:
             raise self._tally.all_failed()
         several = self.method.multi_objective  # the result is a front, not one best trial
         trials = study.trials
-        tie = None if several else tie_note(trials)
-        found_notes = [moved_start_note(study.space), newer_note(trials), tie]
-        found_notes.append(condition_note(trials))
-        found_notes += [] if several else [worsened_note(study.best, study.start)]
-        notes = [
-            *study.shape_notes,
-            *self._notes,
-            *self.method.notes(),
-            *(note for note in found_notes if note is not None),
+        found = [
+            moved_start_note(study.space),
+            newer_note(trials),
+            None if several else tie_note(trials),
+            condition_note(trials),
+            None if several else worsened_note(study.best, study.start),
         ]
+        notes = [*study.shape_notes, *self._notes, *self.method.notes(), *filter(None, found)]
         return SearchResult(study, interrupted, ended, tuple(notes), self.limit)
 
     @contextmanager

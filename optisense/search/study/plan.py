@@ -1,4 +1,6 @@
-"""Plan of a new study: what to search and how, with all defaults resolved."""
+"""Plan of a new study: what to search and how, with all defaults resolved, and the evaluators of
+its settings.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +15,17 @@ from optisense.errors import SearchError
 from optisense.objectives import Objective
 from optisense.objectives.combined import goal_of
 from optisense.quality import TRIAL_PHOTONS
-from optisense.search.evaluation.evaluator import DesignEvaluator, Goal, goal_name, placed
-from optisense.search.evaluation.relit import can_relight
+from optisense.search.evaluation.coarse import CoarseEvaluator
+from optisense.search.evaluation.evaluator import (
+    DesignEvaluator,
+    Evaluator,
+    Goal,
+    goal_name,
+    placed,
+)
+from optisense.search.evaluation.relit import RelitEvaluator, can_relight
 from optisense.search.evaluation.requirements import requirements_of
+from optisense.search.evaluation.robust import RobustEvaluator
 from optisense.search.methods import Method, Problem, find, make
 from optisense.search.methods import names as method_names
 from optisense.search.space.constraints import Constraint, UserRule
@@ -49,12 +59,8 @@ class Plan:
     coarse_first: bool = False
 
     def settings_for(self, design: SensorDesign) -> StudySettings:
-        """Return the settings of the study for a design, with all defaults resolved.
-
-        Raises:
-            SearchError: a field of the plan is invalid.
-            DesignError: a path names nothing in the design.
-            ObjectiveError: an objective or a setting is unknown.
+        """Return the settings of the study for a design, with all defaults resolved; an error if a
+        field of the plan is invalid or names nothing in the design.
         """
         bound = self.space.bind(design)
         settings = dict(self.settings or {})
@@ -147,6 +153,35 @@ class Plan:
                 "scores would save no time",
                 hint="Leave --coarse-first out",
             )
+
+
+def evaluators(
+    settings: StudySettings, usual: DesignEvaluator, method: Method
+) -> tuple[Evaluator, Evaluator]:
+    """Return the evaluator of a study's trials, and that of full scores, which is the same unless
+    trials have coarse scores. The method may replace `usual`, the evaluator of plain scores.
+    """
+    own = method.evaluator(usual)
+    if own is usual and settings.errors is None and can_relight(usual):
+        relit = RelitEvaluator(usual)
+        return relit, relit
+    if settings.errors is not None and own is not usual:
+        raise SearchError(
+            f"{settings.method} can't search with manufacturing errors: it scores in a way "
+            "of its own",
+            hint="Use cma-es, grid or random; or search without errors and look at the winner with "
+            "`optisense tolerance`",
+        )
+    full = _with_errors(settings, usual) if own is usual else own
+    return (_with_errors(settings, CoarseEvaluator(usual)) if settings.coarse_first else full), full
+
+
+def _with_errors(settings: StudySettings, usual: DesignEvaluator) -> Evaluator:
+    """Return an evaluator that also applies the manufacturing errors of a study, if it has any."""
+    if settings.errors is None:
+        return usual
+    errors = ManufacturingErrors.from_plain(settings.errors)
+    return RobustEvaluator(usual, errors, settings.seed, settings.samples)
 
 
 def reference(goal: Goal) -> str:

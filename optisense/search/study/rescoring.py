@@ -153,14 +153,10 @@ def promote(study: Study, work: Work) -> None:
     while (leader := _leader(promoted)) is not None and len(leader.fresh) < len(seeds):
         others = [trial for trial in promoted if trial.number != leader.number]
         promoted = [*scored([leader], seeds, work), *others]
-    if start and leader is not None and _may_be_as_good(start[0], leader):
-        scored(start, seeds, work)
-
-
-def _may_be_as_good(trial: Trial, leader: Trial) -> bool:
-    """Return whether chance may be why a trial with one full score is worse than the leader."""
-    chance = DEVIATIONS * math.sqrt(2.0) * leader.fresh_spread()
-    return trial.fresh_score() > leader.fresh_score() - chance
+    if start and leader is not None:  # two scores of a design differ by chance, as the leader's do
+        chance = DEVIATIONS * math.sqrt(2.0) * leader.fresh_spread()
+        if start[0].fresh_score() > leader.fresh_score() - chance:
+            scored(start, seeds, work)
 
 
 def _promising(promoted: Sequence[Trial], batch: Sequence[Trial]) -> list[Trial]:

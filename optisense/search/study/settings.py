@@ -49,32 +49,22 @@ class StudySettings:
     """Settings that determine the course of a study.
 
     Attributes:
-        design: name of the design.
-        fingerprint: fingerprint of the design (see `optisense.design.difference`).
+        design, fingerprint: name and fingerprint of the design (`optisense.design.difference`).
         space: parameters, as from `SearchSpace.to_plain`.
         objectives: references to the objectives: names, FILE.py:FUNCTION, or "function:NAME" for
             functions of the program that began the study.
         names: names of their scores, in the same order.
-        method: name of the search method.
-        options: options of the method.
-        budget: number of trials that the method plans for.
-        seed: seed of the method and of all trials.
-        settings: settings of the objectives.
-        apart: whether designs are forbidden whose parts cut through one another or leave the parts
-            on which they rest.
         rules: constraints as FILE.py:FUNCTION, or "function:NAME".
         files: SHA-256 of each user's file with objectives or rules, by path.
         packages: installed packages of objectives, the method and kinds
             (`optisense.search.study._same_scoring`); empty also if they were not stored yet.
         errors: manufacturing errors, as from `ManufacturingErrors.to_plain`, for P10; else None.
-        samples: number of manufactured sensors per trial.
-        requirements: conditions that the best trial must meet.
-        coarse_first: whether trials have coarse scores, and only the promising ones full scores.
         scoring: version of the definitions of the scores (`optisense.search.study._same_scoring`);
             0 if it was not stored yet.
         begun: time of creation, UTC.
         versions: versions of the packages with which the study was begun.
 
+    See `optisense.search.search` for the others.
     Values that are read from a file must have these types, and unknown fields are refused.
     Parameters, manufacturing errors and options are checked where they are used.
     """
@@ -135,11 +125,7 @@ class StudySettings:
 
     @staticmethod
     def load(folder: Path) -> StudySettings:
-        """Read study.json.
-
-        Raises:
-            SearchError: there is no study, its settings can't be read, or are of a newer release.
-        """
+        """Read study.json; SearchError if there is no study, or its settings can't be read."""
         path = folder / STUDY_FILE
         if not is_file(path):
             raise SearchError(

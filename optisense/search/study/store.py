@@ -96,14 +96,8 @@ class Store:
 
     @staticmethod
     def create(path: Path | None, objectives: Sequence[str]) -> Store:
-        """Create a store, open for writing.
-
-        Args:
-            path: path of the file, which must not exist; None keeps everything in memory.
-            objectives: names of the objectives in the order of the stored scores.
-
-        Raises:
-            OutputError: the file can't be written.
+        """Create a store at a path where there is no file, or in memory, open for writing; scores
+        are stored in the order of the names of the objectives.
         """
         store = Store(path, objectives)
         with translated_errors(path):
@@ -116,12 +110,7 @@ class Store:
 
     @staticmethod
     def open(path: Path, objectives: Sequence[str]) -> Store:
-        """Open a store for reading.
-
-        Raises:
-            SearchError: the file is no store, or one of a newer version.
-            OutputError: the file can't be read.
-        """
+        """Open a store for reading; SearchError if the file is none, or of a newer version."""
         check_size(path, MOST_STORE, SearchError, "the study's store")
         store = Store(path, objectives)
         with store._read() as db:
@@ -134,11 +123,7 @@ class Store:
         return store
 
     def open_writer(self) -> None:
-        """Open the store for writing; the caller holds the lock of the folder.
-
-        Raises:
-            OutputError: the file can't be written.
-        """
+        """Open the store for writing; the caller holds the lock of the folder."""
         if self._db is None:
             if self.path is not None and self.path.is_symlink():
                 raise OutputError(
