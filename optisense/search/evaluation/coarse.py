@@ -76,11 +76,7 @@ class CoarseEvaluator(DesignEvaluator):
 
     @cached_property
     def used_settings(self) -> Mapping[str, Any]:
-        """The settings, with images in which contacts have enough pixels.
-
-        Raises:
-            SetupError: the renderer can't run on this machine.
-        """
+        """The settings, with images in which contacts have enough pixels."""
         design = self.space.design
         shared, _ = split_settings(self._full, self._all_objectives)
         settings = Settings(**{**shared, "resolution": _full_size(design, self._full)})

@@ -47,11 +47,8 @@ class ModelCache(PickledWithoutCaches):
         self.coarse = coarse
 
     def model(self, design: SensorDesign) -> OpticalModel:
-        """Return the model of a design. It replaces the model returned before, which must no longer
-        be used.
-
-        Raises:
-            OptiSenseError: the design can't be built.
+        """Return the model of a design, or OptiSenseError if it can't be built. It replaces the
+        model returned before, which must no longer be used.
         """
         if self._model is None:
             from optisense.optics import CoarseModel, OpticalModel

@@ -50,10 +50,8 @@ class Requirement:
     @staticmethod
     @lru_cache(maxsize=256)  # all trials of a study have the same few
     def parse(text: str) -> Requirement:
-        """Parse a condition.
-
-        Raises:
-            SearchError: the text is no condition; the message marks the place in the text.
+        """Parse a condition; the message of the SearchError marks the place
+        where a text is none.
         """
         found = re.fullmatch(r"(?P<what>[^<>=]*)(?P<sign>>=|<=)(?P<limit>[^<>=]*)", text)
         if found is None:
@@ -88,11 +86,7 @@ class Requirement:
         return value - self.limit if self.at_least else self.limit - value
 
     def objective(self) -> Objective:
-        """Return the objective that measures the quantity.
-
-        Raises:
-            SearchError: there is no such objective.
-        """
+        """Return the objective that measures the quantity; SearchError if there is none."""
         try:
             for name in named_in([self.quantity]):
                 if name not in OBJECTIVES:

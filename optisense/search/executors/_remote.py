@@ -72,11 +72,8 @@ class DaskRunner(Runner):
     """
 
     def __init__(self, evaluator: Evaluator, address: str) -> None:
-        """Connect to the scheduler, and send the evaluator to the workers.
-
-        Raises:
-            SetupError: Dask is not installed, no scheduler answers, or there is no worker.
-            SearchError: the evaluator can't be pickled.
+        """Connect to the scheduler, and send the evaluator to the workers; SetupError if Dask is
+        not installed, no scheduler answers, or there is no worker.
         """
         blob = pickled(evaluator)
         self._key = hashlib.sha256(blob).hexdigest()

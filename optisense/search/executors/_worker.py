@@ -51,7 +51,11 @@ def main() -> None:
         except OSError:
             return  # the pool has closed the pipe
         except Exception as error:
-            send(answers, ("error", _sendable(error)))
+            told = f"{type(error).__name__}: {error}"  # not every error can be pickled
+            send(
+                answers,
+                ("error", error if isinstance(error, OptiSenseError) else RuntimeError(told)),
+            )
 
 
 def _listen(stream: BinaryIO, messages: queue.SimpleQueue[Any]) -> None:
@@ -61,13 +65,6 @@ def _listen(stream: BinaryIO, messages: queue.SimpleQueue[Any]) -> None:
             messages.put(receive(stream))
     except (EOFError, OSError):
         os._exit(0)
-
-
-def _sendable(error: Exception) -> Exception:
-    """Return an error of this package as it is, and any other as one that can be pickled."""
-    if isinstance(error, OptiSenseError):
-        return error
-    return RuntimeError(f"{type(error).__name__}: {error}")
 
 
 if __name__ == "__main__":

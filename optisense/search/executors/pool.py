@@ -81,14 +81,9 @@ class ProcessPool(Runner):
     """Pool of worker processes on this machine, each with its share of the processor's threads."""
 
     def __init__(self, evaluator: Evaluator, workers: int, threads: int | None = None) -> None:
-        """Start the workers, which get ready in the background.
-
-        Args:
-            workers: number of processes.
-            threads: threads of each worker's renderer; the worker's share of processors if None.
-
-        Raises:
-            SearchError: `workers` is below 1, or the evaluator can't be pickled.
+        """Start the workers, which get ready in the background, each with its share of processors
+        or some threads of the renderer; SearchError if there is none or the evaluator can't be
+        pickled.
         """
         if workers < 1:
             raise SearchError(f"the number of workers is {workers}", hint="Give 1 or more")

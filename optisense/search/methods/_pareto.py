@@ -69,7 +69,11 @@ class Pareto(Method):
             self._children = cube.random(self.population)
             self._children[0] = self.space.unit_of(self.space.start)
         else:
-            self._children = self._offspring()
+            rank = ranks(self._values, self._broken)
+            room = crowding(self._values, rank)
+            mothers, fathers = self._winners(rank, room), self._winners(rank, room)
+            children = self._crossed(self._genes[mothers], self._genes[fathers])
+            self._children = self._mutated(children)
         return self.space.from_unit(self._children)
 
     def tell(self, vectors: FloatArray, outcomes: Sequence[Outcome]) -> None:
@@ -88,13 +92,6 @@ class Pareto(Method):
         rank = ranks(scores, broken)
         best = np.lexsort((-crowding(scores, rank), rank))[: self.population]
         self._genes, self._values, self._broken = everyone[best], scores[best], broken[best]
-
-    def _offspring(self) -> FloatArray:
-        rank = ranks(self._values, self._broken)
-        room = crowding(self._values, rank)
-        mothers, fathers = self._winners(rank, room), self._winners(rank, room)
-        children = self._crossed(self._genes[mothers], self._genes[fathers])
-        return self._mutated(children)
 
     def _winners(self, rank: NDArray[np.int64], room: FloatArray) -> NDArray[np.int64]:
         """Return the winners of binary tournaments, (population / 2,): the better of two drawn."""
@@ -124,8 +121,8 @@ class Pareto(Method):
     def _mutated(self, genes: FloatArray) -> FloatArray:
         chosen = self._random.random(genes.shape) < 1.0 / genes.shape[1]
         draw = self._random.random(genes.shape)
-        power = 1.0 / (MUTATION_SPREAD + 1.0)
         exponent = MUTATION_SPREAD + 1.0
+        power = 1.0 / exponent
         below = (2.0 * draw + (1.0 - 2.0 * draw) * (1.0 - genes) ** exponent) ** power - 1.0
         above = 1.0 - (2.0 * (1.0 - draw) + 2.0 * (draw - 0.5) * genes**exponent) ** power
         moved = np.clip(genes + np.where(draw < 0.5, below, above), 0.0, 1.0)

@@ -15,7 +15,8 @@ from optisense.search.methods.base import Method, Problem
 
 def _check(name: str, kind: Any) -> None:
     must_derive(Method, SearchError, "search method")(name, kind)
-    lacking = [each for each in ("name", "summary") if not _is_text(getattr(kind, each, None))]
+    texts = {each: getattr(kind, each, None) for each in ("name", "summary")}
+    lacking = [key for key, text in texts.items() if not isinstance(text, str) or not text.strip()]
     lacking += sorted(getattr(kind, "__abstractmethods__", ()))
     if lacking:
         raise SearchError(
@@ -23,10 +24,6 @@ def _check(name: str, kind: Any) -> None:
             where=place_of_definition(kind),
             hint="Its class needs the texts name and summary, and the methods ask and tell",
         )
-
-
-def _is_text(value: object) -> bool:
-    return isinstance(value, str) and value.strip() != ""
 
 
 METHODS: Registry[type[Method]] = Registry(

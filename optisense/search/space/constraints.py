@@ -114,11 +114,7 @@ class UserRule(PickledWithoutCaches):
     """Function in a user's Python file, loaded when it is first called."""
 
     def __init__(self, text: str) -> None:
-        """Parse FILE.py:FUNCTION. The file, which may come from a stranger, is not run yet.
-
-        Raises:
-            SearchError: the text has another form.
-        """
+        """Parse FILE.py:FUNCTION. The file, which may come from a stranger, is not run yet."""
         file, colon, self.function = text.rpartition(":")
         if not colon or not file.endswith(".py") or not self.function:
             raise SearchError(f"'{text}' is not a rule", hint="Write FILE.py:FUNCTION")

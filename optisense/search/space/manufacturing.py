@@ -14,7 +14,7 @@ from optisense.design import SensorDesign, set_value
 from optisense.errors import DesignError, SearchError
 from optisense.near import suggestion
 from optisense.search.space._expansion import expand
-from optisense.search.space.parameters import Around, CagePoints, Continuous, Integer, Parameter
+from optisense.search.space.parameters import Around, CagePoints, Continuous, Parameter
 from optisense.search.space.search_space import BoundSpace, SearchSpace
 
 TRUNCATION = 3.0
@@ -170,7 +170,9 @@ class BoundManufacturingErrors:
         prepared = design
         for number, (source, spread) in enumerate(errors.distributions.items()):
             for path in _paths(design, source):
-                prepared, found = expand(prepared, path, _all_points(path, spread))
+                around = Around(spread.reach)
+                whole = re.fullmatch(r"cages\.[^.]+\.points", path)
+                prepared, found = expand(prepared, path, CagePoints(around) if whole else around)
                 for each in found:
                     if each.name in ranges:
                         raise SearchError(
@@ -197,9 +199,6 @@ class BoundManufacturingErrors:
     def apply(self, errors: FloatArray) -> SensorDesign:
         """Return the design with these errors (d,); values beyond a limit of the design are clipped
         to it.
-
-        Raises:
-            OptiSenseError: the values do not fit together.
         """
         return self.space.apply(self.points(errors))
 
@@ -243,15 +242,10 @@ def _paths(design: SensorDesign, source: str) -> list[str]:
     ]
 
 
-def _all_points(path: str, spread: ToleranceDistribution) -> Around | CagePoints:
-    around = Around(spread.reach)
-    return CagePoints(around) if re.fullmatch(r"cages\.[^.]+\.points", path) else around
-
-
 def _limits(design: SensorDesign, parameter: Parameter, source: str) -> Continuous | Around:
     """Return the range of a value with errors, clipped where the design refuses it."""
     kind = parameter.kind
-    if isinstance(kind, Integer) or not isinstance(kind, Continuous):
+    if not isinstance(kind, Continuous):
         raise SearchError("a whole number or a name has no manufacturing error", where=source)
     if parameter.variable is not None or parameter.name.startswith("cages."):
         return kind

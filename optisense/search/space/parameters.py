@@ -262,11 +262,7 @@ def _plain(value: Any) -> Any:
 
 
 def from_plain(data: Mapping[str, Any]) -> Specification:
-    """Return the specification for values of `to_plain`.
-
-    Raises:
-        SearchError: the values are not what `to_plain` writes.
-    """
+    """Return the specification for values of `to_plain`; SearchError for other values."""
     try:
         given = dict(data)
         kind = _KINDS[given.pop("kind")]

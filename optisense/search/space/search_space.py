@@ -144,18 +144,19 @@ class BoundSpace:
 
     def values(self, vector: ArrayLike) -> dict[str, float | int | str]:
         """Return the values of a point (n,) by parameters: numbers, and labels of options."""
-        return {
-            parameter.name: _meaning(parameter, coordinate)
-            for parameter, coordinate in zip(
-                self.parameters, np.asarray(vector, dtype=float).tolist(), strict=True
-            )
-        }
+        point = np.asarray(vector, dtype=float)
+        found: dict[str, float | int | str] = {}
+        for parameter, coordinate in zip(self.parameters, point.tolist(), strict=True):
+            kind, whole = parameter.kind, round(coordinate)
+            if isinstance(kind, Choice):
+                found[parameter.name] = kind.labels[whole]
+            else:
+                found[parameter.name] = whole if isinstance(kind, Integer) else coordinate
+        return found
 
     def check(self, vector: ArrayLike) -> None:
-        """Check that a vector (n,) is a point of the space.
-
-        Raises:
-            SearchError: it is not; the message names the first coordinate outside its bounds.
+        """Check that a vector (n,) is a point of the space; the SearchError names the first
+        coordinate outside its bounds.
         """
         point = np.asarray(vector, dtype=float)
         if point.shape != (self.size,):
@@ -194,11 +195,7 @@ class BoundSpace:
         return np.where(self.discrete, middle, self.to_unit(point))
 
     def apply(self, vector: ArrayLike) -> SensorDesign:
-        """Return the design at a point (n,).
-
-        Raises:
-            OptiSenseError: the values do not fit together.
-        """
+        """Return the design at a point (n,); OptiSenseError if the values do not fit together."""
         point = np.asarray(vector, dtype=np.float64)
         design = self.prepared
         for number, variable in self._first:
@@ -289,13 +286,6 @@ class BoundSpace:
 def checked(design: SensorDesign) -> SensorDesign:
     """Return a design after all checks of its fields; DesignError if a value does not fit."""
     return design._replaced(design._data(), where="the varied design")
-
-
-def _meaning(parameter: Parameter, coordinate: float) -> float | int | str:
-    kind = parameter.kind
-    if isinstance(kind, Choice):
-        return kind.labels[round(coordinate)]
-    return round(coordinate) if isinstance(kind, Integer) else coordinate
 
 
 def _may_nest(path: str) -> bool:

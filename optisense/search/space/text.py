@@ -36,11 +36,7 @@ TOGETHER = "together"
 
 
 def parse_vary(text: str) -> tuple[str, Specification]:
-    """Parse the path and the specification of a parameter.
-
-    Raises:
-        SearchError: the text can't be read, or its bounds are invalid.
-    """
+    """Parse the path and the specification of a parameter; SearchError if the text is none."""
     path, equals, rest = (part.strip() for part in text.partition("="))
     if not equals or not path or not rest:
         raise SearchError(f"'{text}' is not a parameter and its range", hint=EXAMPLE)
@@ -55,11 +51,7 @@ def parse_vary(text: str) -> tuple[str, Specification]:
 
 
 def parse_space(texts: list[str]) -> dict[str, Specification]:
-    """Parse several parameters, by path.
-
-    Raises:
-        SearchError: a text can't be read, or two have the same path.
-    """
+    """Parse several parameters, by path; SearchError if two have the same path."""
     found: dict[str, Specification] = {}
     for text in texts:
         path, spec = parse_vary(text)
@@ -70,11 +62,7 @@ def parse_space(texts: list[str]) -> dict[str, Specification]:
 
 
 def parse_errors(texts: list[str]) -> ManufacturingErrors:
-    """Parse manufacturing errors: PATH=SIZE is a standard deviation, PATH=+-LIMIT a limit.
-
-    Raises:
-        SearchError: a text can't be read, or two have the same path.
-    """
+    """Parse manufacturing errors: PATH=SIZE is a standard deviation, PATH=+-LIMIT a limit."""
     found: dict[str, ToleranceDistribution] = {}
     for text in texts:
         path, equals, size = (part.strip() for part in text.partition("="))

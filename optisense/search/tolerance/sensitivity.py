@@ -93,16 +93,11 @@ def total_effect(scores: ArrayLike, source: int) -> Estimate | None:
     if known.sum() < LEAST_PAIRS:
         return None
     again = [_share(values[rows], source) for rows in _resampled(len(values))]
-    return _within_bounds(_estimate(_share(values, source), again))
-
-
-def _within_bounds(share: Estimate) -> Estimate:
-    """Return a share clipped to at most 1. Jansen's formula can give 1.65 where a share is near 1
-    and sensors are few; clipping brings every estimate nearer to the truth. The standard error is
-    that of the unclipped estimate.
-    """
-    value, low, high = (min(1.0, each) for each in (share.value, share.low, share.high))
-    return Estimate(value, low, high, share.error)
+    found = _estimate(_share(values, source), again)
+    # Jansen's formula can give 1.65 where a share is near 1 and sensors are few. The true share is
+    # never above 1, so clipping brings every estimate nearer to the truth.
+    value, low, high = (min(1.0, each) for each in (found.value, found.low, found.high))
+    return Estimate(value, low, high, found.error)
 
 
 def _share(values: FloatArray, source: int) -> float:
