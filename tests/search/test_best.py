@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import replace
 from itertools import permutations
@@ -12,7 +11,6 @@ import pytest
 
 from optisense.cli.search_result import headline
 from optisense.design import SensorDesign
-from optisense.search import SearchResult, search
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.space.search_space import BoundSpace, SearchSpace
 from optisense.search.study.best import best_of, distance, front_among, tie_note, tied
@@ -113,19 +111,6 @@ def test_a_newer_trial_is_the_best_if_no_fresh_score_tells_about_it(space: Bound
     assert best(*older, found(3, 3.0, newer=True)) == 3
     assert best(*older, found(3, 1.5, newer=True)) == 1
     assert best(*older, found(3, 3.0, newer=True, fresh=0.5), found(4, 2.5, newer=True)) == 1
-
-
-def test_a_search_tells_its_ties_the_same_way_each_time(mini: SensorDesign) -> None:
-    def plateau(design: SensorDesign) -> float:
-        return float(design.coating.specularity >= 0.5)
-
-    def run() -> SearchResult:
-        return search(mini, {"coating.specularity": (0.0, 1.0, 11)}, plateau, method="grid")
-
-    first, second = run(), run()
-    assert first.best.values == second.best.values == {"coating.specularity": 0.5}
-    assert first.notes == second.notes
-    assert json.dumps(first.notes).count("6 trials share the best score") == 1
 
 
 def test_a_gain_within_the_noise_is_told(space: BoundSpace) -> None:

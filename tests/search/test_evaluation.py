@@ -70,11 +70,6 @@ class TestScores:
         copy(space.start, 0)
         assert not heard
 
-    def test_parts_are_kept(self, svelte: SensorDesign) -> None:
-        space = SearchSpace({"camera.turn.x": (-1.0, 1.0)}).bind(svelte)
-        outcome = DesignEvaluator(space, ["aoap"])(space.start, 0)
-        assert 0.0 < outcome.parts["aoap"]["coverage"] <= 1.0
-
     def test_what_fails_is_told_and_the_rest_scored(self, svelte: SensorDesign) -> None:
         """A camera that looks away sees nothing: no score, but the plain function has one."""
         space = SearchSpace({"camera.turn.x": (-180.0, 180.0)}).bind(svelte)

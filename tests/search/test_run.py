@@ -72,22 +72,13 @@ def test_a_failed_trial_is_kept_with_its_reason(mini: SensorDesign) -> None:
     def picky(design: SensorDesign) -> float:
         if design.coating.specularity > 0.4:
             raise ValueError("too shiny")
-        return design.coating.specularity
+        return design.coating.specularity or math.nan
 
     result = search(mini, {"coating.specularity": (0.0, 1.0, 11)}, picky, method="grid")
     failed = [trial for trial in result.trials if trial.failure]
-    assert len(failed) == 6
-    assert all("too shiny" in str(trial.failure) for trial in failed)
+    assert ["too shiny" in str(trial.failure) for trial in failed] == [False] * 2 + [True] * 6
     assert all(math.isnan(trial.score) for trial in failed)
     assert result.best.score == pytest.approx(0.4)
-
-
-def test_a_score_that_is_no_number_fails(mini: SensorDesign) -> None:
-    def hole(design: SensorDesign) -> float:
-        return math.nan if design.coating.specularity == 0.5 else 1.0
-
-    result = search(mini, {"coating.specularity": (0.0, 1.0, 3)}, hole, method="grid")
-    assert [trial.failure is not None for trial in result.trials] == [False, False, True, False]
 
 
 def test_stops_early_when_every_trial_fails(
@@ -150,14 +141,6 @@ def test_a_rule_forbids_designs(mini: SensorDesign, goals: ModuleType) -> None:
     result = search(mini, space, goals.brightness, method="grid")
     assert {trial.failure for trial in result.trials} == {None, "too shiny"}
     assert result.best.score == 0.0
-
-
-def test_the_same_seed_is_the_same_study(mini: SensorDesign, goals: ModuleType) -> None:
-    one, same, other = (
-        search(mini, SPACE, goals.nearness, budget=60, seed=seed).study for seed in (1, 1, 2)
-    )
-    assert np.array_equal(vectors(one), vectors(same))
-    assert not np.array_equal(vectors(one), vectors(other))
 
 
 class Noisy:

@@ -219,10 +219,6 @@ class TestTogether:
         with pytest.raises(SearchError, match="cage points need bounds or a reach"):
             CagePoints(Choice(["R", "G"]))  # type: ignore[arg-type]
 
-    def test_it_is_kept_with_a_study(self) -> None:
-        space = SearchSpace({"lights.*.flux": Together(Continuous(1.0, 9.0, 3))})
-        assert SearchSpace.from_plain(space.to_plain()).parameters == space.parameters
-
     @pytest.mark.parametrize(
         ("path", "spec", "said"),
         [
@@ -392,6 +388,7 @@ def test_plain_values_are_the_same_space(mini: SensorDesign, svelte: SensorDesig
     for design, asked in (
         (mini, {"coating.specularity": (0.0, 1.0, 11), "lights.red.colour": ["R", "G"]}),
         (mini, {"camera.resolution[0]": Integer(100, 200), "camera.position": Around(0.5)}),
+        (mini, {"lights.*.flux": Together(Continuous(1.0, 9.0, 3))}),
         (svelte, {"cages.M1.points": CagePoints(Around(2.0), (0, 1, 5), "xz", "y")}),
     ):
         space = SearchSpace(asked)
