@@ -35,6 +35,10 @@ NOISE_HELP = (
 )
 
 
+ReaderMethod = Annotated[str, OptionNotation("network|table")]
+READER_HELP = "What estimates normals from colours: a neural network or a lookup table."
+
+
 class PictureOptions(CommandOptions):
     """Options of the pictures of a task."""
 
@@ -143,10 +147,7 @@ class DatasetOptions(EstimatorOptions):
 class ReconstructionOptions(PictureOptions):
     """Options of reconstructions, which read the shape of an object from colours."""
 
-    method: Annotated[str, OptionNotation("network|table")] = Field(
-        "network",
-        description="What estimates normals from colours: a neural network or a lookup table.",
-    )
+    method: ReaderMethod = Field("network", description=READER_HELP)
     presses: Annotated[int, Ge(1), Le(MOST_ITEMS), OptionNotation("N")] = Field(
         40, description="Number of ball presses that calibrate the reader of normals."
     )
@@ -204,10 +205,7 @@ class VerifyOptions(CommandOptions):
         Annotated[Photons, OptionNotation("N", usual="fine, quick 500,000", is_text=True)] | None
     ) = Field(None, description="Photons of the light that all pictures of a sensor share.")
     skin: Skin = Field(ELASTIC, description=SKIN_HELP)
-    method: Annotated[str, OptionNotation("network|table")] = Field(
-        "network",
-        description="What estimates normals from colours: a neural network or a lookup table.",
-    )
+    method: ReaderMethod = Field("network", description=READER_HELP)
 
     def wanted_photons(self) -> int:
         """Return the number of photons of the light of each sensor."""

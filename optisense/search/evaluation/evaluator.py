@@ -252,7 +252,9 @@ class DesignEvaluator(PickledWithoutCaches):
 
     def _add_preserving(self, apart: bool) -> None:
         """Add the constraints that keep properties of the start which the space may change."""
-        design, names, moved = self.space.design, self.space.names, moved_parts(self.space)
+        design, names = self.space.design, self.space.names
+        variables = [parameter.variable for parameter in self.space.parameters]
+        moved = {each.name for each in variables if isinstance(each, PartShift | PartTurn)}
         if apart and moved:
             self.kept += [PartsInContact(design, moved), LightsOnSupports(design, moved)]
         bends = any(name.startswith("cages.") for name in names)
@@ -324,12 +326,6 @@ def _failures(scores: Sequence[Score]) -> list[str]:
     if len(reasons) == 1 and all(score.failure is not None for score in scores):
         return list(reasons)
     return [f"{', '.join(names)}: {reason}" for reason, names in reasons.items()]
-
-
-def moved_parts(space: BoundSpace) -> set[str]:
-    """Return the names of the parts that parameters of a space shift or turn."""
-    variables = (parameter.variable for parameter in space.parameters)
-    return {each.name for each in variables if isinstance(each, PartShift | PartTurn)}
 
 
 def goal_name(goal: Goal) -> str:

@@ -120,8 +120,8 @@ class _SeedImages:
 
 
 def _reads_contacts_only(objective: Objective) -> bool:
-    """Return whether an objective reads no pixel outside of the contacts. A user's objective may
-    read pixels around a contact.
+    """Return whether an objective reads no pixel outside of the contacts; a
+    user's objective may.
     """
     own = objective.function.__module__.startswith("optisense.objectives.")
     return own and objective.reads is not None

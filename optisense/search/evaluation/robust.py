@@ -64,7 +64,7 @@ class RobustEvaluator:
             reason = why_forbidden(design, self.usual.kept)
             bound = self.errors.bind(design)
         except OptiSenseError as error:
-            return self.usual.failed(str(error), began)
+            reason = str(error)
         if reason is not None:
             return self.usual.failed(reason, began)
         found = []

@@ -71,14 +71,9 @@ class Agreement(Enum):
 
 
 class CheckedGradient(NamedTuple):
-    """Values and gradients at a point.
-
-    Attributes:
-        values: smoothed score, and smoothed value of the quantity that each condition limits, (1 +
-            m,); the exact ones where there is no smooth form.
-        gradients: gradients of `values` by the coordinates, (1 + m, n).
-        source: source of the gradients: rays, layers or differences.
-        holds: whether the gradient of the score passed the check; None if it was not checked.
+    """Values and gradients at a point: the smoothed score and limited quantities, (1 + m,), exact
+    where there is no smooth form; their gradients by the coordinates, (1 + m, n); the source of
+    these; and whether that of the score passed the check, None if it was not checked.
     """
 
     values: FloatArray

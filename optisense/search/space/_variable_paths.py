@@ -1,23 +1,7 @@
-"""Paths for more than one value: moves of whole groups of lights and parts, and parts of the
-library.
+"""Paths for more than one value: moves of lights, parts and the camera, and parts of the library.
 
-These look like other paths but lead to no single number of a design:
-
-| path | what it does |
-|---|---|
-| `lights.GROUP.shift.x` | moves all lights of a group along x, y or z, mm |
-| `lights.GROUP.turn.x` | turns a group about an axis through its middle, degrees |
-| `lights.GROUP.aim.x` | turns each light of a group about an axis through its own position |
-| `lights.GROUP.lights[0].shift.x`, `.turn.x` | the same for one light |
-| `camera.turn.x` | turns the camera about its own right (x), up (y) or viewing axis (z), degrees |
-| `parts.PART.shift.x` | moves a part, mm |
-| `parts.PART.turn.x` | turns a part about an axis through the middle of its box, degrees |
-| `lights.model` | the type of all lights |
-| `lights.GROUP.model` | the type of the lights of a group |
-| `lights.GROUP.lights[0].model` | the type of one light |
-| `lights.types` | the types of all lights, each by itself |
-| `coating.library`, `camera.model` | a whole coating or camera of the library |
-| `parts.PART.material` | a material of the design or of the library |
+They look like other paths but lead to no single number of a design: `lights.GROUP.shift.x`,
+`parts.PART.turn`, `lights.types`, `coating.library` and others of the table in docs/search.md.
 """
 
 from __future__ import annotations

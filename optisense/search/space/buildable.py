@@ -100,11 +100,8 @@ class PartsInContact:
 
 
 class ContactPoints(NamedTuple):
-    """Points of one part that touch another one.
-
-    Attributes:
-        faces: indices (k,) of the faces of the part that the points lie on.
-        shares: barycentric coordinates (k, 3) in these faces.
+    """Points of one part that touch another one: indices (k,) of the faces of the part on which
+    they lie, and their barycentric coordinates (k, 3) in these.
     """
 
     faces: NDArray[np.int64]
@@ -165,8 +162,6 @@ class LightsOnSupports:
         meshes = design.deformed_meshes()
         for part, lights in self._carried.items():
             for group, index in lights:
-                if part not in meshes or group not in design.lights:
-                    continue
                 off = _off(design, group, index, meshes[part])
                 if off > 2.0 * SEAT_DISTANCE:
                     return (
@@ -178,11 +173,9 @@ class LightsOnSupports:
 
 class LightsOutsideParts:
     """Constraint: no light may lie in a part in which it is not at the start: the middle of its
-    window is in the part, and a corner is deeper than `FLUSH`.
-
-    A light in the acrylic of a tray is brighter than one in front of it, but there is no room for
-    an LED. Lights that are cast into a part from the beginning, as those of GelSight360, are
-    exempt.
+    window is in the part, and a corner is deeper than `FLUSH`. There is no room for an LED in the
+    acrylic of a tray; lights that are cast into a part from the beginning, as those of GelSight360,
+    are exempt.
     """
 
     def __init__(self, design: SensorDesign) -> None:
@@ -252,10 +245,8 @@ class SizeLimit:
 
 class SolidsStaySolid:
     """Constraint: a refractive index may not turn a solid or liquid into a gas, nor an air gap into
-    a solid.
-
-    To a search that varies an index, air is a plate that has vanished. Materials that the search
-    chooses from are exempt.
+    a solid, because air is a plate that has vanished. Materials that the search chooses from are
+    exempt.
     """
 
     def __init__(self, design: SensorDesign) -> None:
@@ -282,7 +273,7 @@ class SolidsStaySolid:
 
 def _off(design: SensorDesign, group: str, index: int, mesh: TriangleMesh) -> float:
     """Return the distance from a light to a mesh, mm; 0 for a light that does not exist."""
-    lights = design.lights[group].lights
+    lights = design.lights[group].lights if group in design.lights else []
     if index >= len(lights):
         return 0.0
     place = np.array(lights[index].position)

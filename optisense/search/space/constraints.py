@@ -89,10 +89,8 @@ class NoCrossings:
 
 
 class NoNewProblems:
-    """Constraint: a check of designs may find no problem that the starting design does not have.
-
-    Such are folds of the parts that cages deform, because a folded part can't be made, and parts
-    that lose contact with those on which they lie.
+    """Constraint: a check of designs may find no problem, such as a fold of a part that cages
+    deform, that the starting design does not have.
     """
 
     def __init__(

@@ -36,8 +36,7 @@ class SearchSpace:
 
     A value is (low, high), (low, high, steps), `Integer`, `Choice` or a list of options, `Around`
     (a distance from the present value), or `CagePoints`. A path to a vector or to a cage's points
-    stands for all their numbers. See `optisense.search.space._variable_paths` for paths that move
-    whole groups and parts.
+    stands for all their numbers. docs/search.md lists the paths that move whole groups and parts.
     """
 
     def __init__(

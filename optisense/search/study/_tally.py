@@ -109,8 +109,8 @@ class Tally:
                 self._leading[name] = number, outcome
 
     def worsened(self) -> dict[str, str]:
-        """Return the watched quantities that are worse in the best trial so far than in the start,
-        by name: "0.41 (start 0.57)".
+        """Return the watched quantities that are worse in the best trial so far: "0.41 (start
+        0.57)".
         """
         leading = self.leading()
         if not leading:

@@ -80,12 +80,9 @@ class Plan:
         if self.errors is not None:
             self.errors.bind(design)
         if self.coarse_first:
-            self._refuse_coarse(
-                chosen, evaluator, [each for each in measured if not each.rays_only]
-            )
-        budget = self.budget
-        if budget is None:
-            budget = chosen.default_budget(bound)
+            from_pictures = [each for each in measured if not each.rays_only]
+            self._refuse_coarse(chosen, evaluator, from_pictures)
+        budget = chosen.default_budget(bound) if self.budget is None else self.budget
         if budget < 1:
             raise SearchError(f"the budget is {budget} trials", hint="Give 1 or more")
         if not 0 <= self.seed < 2**32:
@@ -129,10 +126,7 @@ class Plan:
         return 0
 
     def _refuse_coarse(
-        self,
-        method: type[Method],
-        evaluator: DesignEvaluator,
-        from_pictures: Sequence[Objective],
+        self, method: type[Method], evaluator: DesignEvaluator, from_pictures: Sequence[Objective]
     ) -> None:
         """Raise SearchError if coarse scores save nothing or can't guide the method."""
         if not method.accepts_coarse_scores:
