@@ -4,7 +4,6 @@ its settings.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -33,8 +32,7 @@ from optisense.search.space.manufacturing import SAMPLES, ManufacturingErrors
 from optisense.search.space.search_space import SearchSpace
 from optisense.search.study._same_scoring import SCORING, packages_of
 from optisense.search.study.settings import ONLY_HERE, StudySettings
-from optisense.search.study.trust import file_of
-from optisense.untrusted_files import MOST_PROGRAM, read_bytes
+from optisense.search.study.trust import file_prints
 
 RAYS_ACROSS = 320
 """Number of chief rays across the image unless `ray_resolution` is given: a quarter of the rays of
@@ -211,12 +209,3 @@ def known_rules(settings: StudySettings, given: Sequence[Constraint] | None) -> 
     if given:
         return list(given)
     return [UserRule(rule) for rule in settings.rules if not rule.startswith(ONLY_HERE)]
-
-
-def file_prints(references: Sequence[str]) -> dict[str, str]:
-    """Return the SHA-256 of each user's Python file that is named, by its path."""
-    return {
-        str(file): hashlib.sha256(read_bytes(file, MOST_PROGRAM, SearchError)).hexdigest()
-        for file in filter(None, map(file_of, references))
-        if file.is_file()
-    }

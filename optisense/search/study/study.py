@@ -34,11 +34,11 @@ from optisense.search.study.folder import (
     save_and_reload,
     unedited_design,
 )
-from optisense.search.study.plan import Plan, file_prints, known_goals, known_rules
+from optisense.search.study.plan import Plan, known_goals, known_rules
 from optisense.search.study.settings import ONLY_HERE, StudySettings
 from optisense.search.study.store import Row, Store
 from optisense.search.study.trial import Trial
-from optisense.search.study.trust import not_trusted, trust
+from optisense.search.study.trust import file_prints, not_trusted, trust
 
 BUDGET = "budget"
 """Name of the fact that holds the budget of a study that was resumed with a larger one."""

@@ -53,10 +53,20 @@ def _note(reference: str) -> str:
     """Return a line with the hash of the file's present content, and the reference in one line."""
     file = file_of(reference)
     try:
-        content = b"" if file is None else read_bytes(file, MOST_PROGRAM, SearchError)
+        found = "" if file is None else _sha256(file)
     except SearchError:
-        content = b""
-    return f"{hashlib.sha256(content).hexdigest()} {reference!r}"
+        found = ""
+    return f"{found} {reference!r}"
+
+
+def file_prints(references: Iterable[str]) -> dict[str, str]:
+    """Return the SHA-256 of each user's Python file that is named, by its path."""
+    files = filter(None, map(file_of, references))
+    return {str(file): _sha256(file) for file in files if file.is_file()}
+
+
+def _sha256(file: Path) -> str:
+    return hashlib.sha256(read_bytes(file, MOST_PROGRAM, SearchError)).hexdigest()
 
 
 def _notes() -> Path:
