@@ -11,6 +11,7 @@ import pytest
 import optisense as ots
 from optisense.design import SensorDesign
 from optisense.search.space.search_space import BoundSpace, SearchSpace
+from optisense.sensors import gelsight_svelte
 
 TWO_NUMBERS = {"coating.specularity": (0.0, 1.0, 5), "camera.position.x": (-1.0, 3.0, 3)}
 """A space in which `cheap_goals` make sense."""
@@ -24,6 +25,12 @@ def mini() -> SensorDesign:
 @pytest.fixture(scope="session")
 def svelte() -> SensorDesign:
     return ots.load("gelsight-svelte")
+
+
+@pytest.fixture(scope="session")
+def coarse_svelte() -> SensorDesign:
+    """A GelSight Svelte of few triangles."""
+    return gelsight_svelte(tessellation=1.0, m1_grid=(60, 15))
 
 
 @pytest.fixture(scope="session")

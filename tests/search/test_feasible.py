@@ -9,7 +9,6 @@ from optisense import SensorDesign
 from optisense.search import Around, SearchSpace
 from optisense.search.methods._feasible import FeasibleRegion
 from optisense.search.space.constraints import NoCrossings
-from optisense.sensors import gelsight_svelte
 
 MIRROR = {
     "cages.M1.points.x": Around(8.0),
@@ -18,15 +17,12 @@ MIRROR = {
 }
 
 
-@pytest.fixture(scope="module")
-def svelte() -> SensorDesign:
-    return gelsight_svelte(tessellation=1.0, m1_grid=(60, 15))
-
-
-def test_a_mirror_that_is_wanted_inside_a_part_is_moved_beside_it(svelte: SensorDesign) -> None:
+def test_a_mirror_that_is_wanted_inside_a_part_is_moved_beside_it(
+    coarse_svelte: SensorDesign,
+) -> None:
     """The point usually is closer than on the straight way back, orthogonal to free directions."""
-    space = SearchSpace(MIRROR).bind(svelte)
-    region = FeasibleRegion(space, [NoCrossings(svelte)], ["M1"])
+    space = SearchSpace(MIRROR).bind(coarse_svelte)
+    region = FeasibleRegion(space, [NoCrossings(coarse_svelte)], ["M1"])
     start = space.to_unit(space.start)
     assert region.allows(start)
     found = slid = 0
@@ -50,8 +46,8 @@ def test_a_mirror_that_is_wanted_inside_a_part_is_moved_beside_it(svelte: Sensor
     assert slid >= 0.5 * found
 
 
-def test_other_constraints_are_met_on_the_way_back(svelte: SensorDesign) -> None:
-    space = SearchSpace(MIRROR).bind(svelte)
+def test_other_constraints_are_met_on_the_way_back(coarse_svelte: SensorDesign) -> None:
+    space = SearchSpace(MIRROR).bind(coarse_svelte)
     start = space.to_unit(space.start)
     middle = space.names.index("cages.M1.points[13].x")
     most = space.start[middle] + 0.5

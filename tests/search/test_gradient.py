@@ -24,7 +24,6 @@ from optisense.search.methods.checked_gradients import (
 )
 from optisense.search.methods.gradient import Gradient
 from optisense.search.methods.score_differences import GradientSource, ScoreDifferences
-from optisense.sensors import gelsight_svelte
 
 SETTINGS = {"ray_resolution": (160, 120)}
 
@@ -33,11 +32,6 @@ TRUE = {"ray_resolution": (640, 480)}
 
 
 RESOLUTION = 160
-
-
-@pytest.fixture(scope="module")
-def svelte() -> SensorDesign:
-    return gelsight_svelte(tessellation=1.0, m1_grid=(60, 15))
 
 
 def method(
@@ -70,11 +64,11 @@ def freed(design: SensorDesign, cage: str) -> SensorDesign:
     [("points[12].x", 0.1), ("points[13].x", 0.1), ("points[22].z", 0.1), ("fov", 0.1)],
 )
 def test_slopes_of_svelte_are_the_changes_of_the_smoothed_score(
-    svelte: SensorDesign, name: str, step: float
+    coarse_svelte: SensorDesign, name: str, step: float
 ) -> None:
     """The mirror's rays are cut off by the second mirror and the body, too."""
     path = "camera.fov" if name == "fov" else f"cages.M1.{name}"
-    found = method(freed(svelte, "M1"), {path: Around(1.0)})
+    found = method(freed(coarse_svelte, "M1"), {path: Around(1.0)})
     evaluator, start = slopes_of(found), found.space.start
     _, gradient = evaluator.gradient(start)
     values = [evaluator.gradient(start + way)[0] for way in (step, -step)]
@@ -223,10 +217,10 @@ def test_an_ascent_slides_along_the_parts_that_the_mirror_meets() -> None:
 
 
 def test_derivatives_that_differences_contradict_at_the_start_are_checked_everywhere(
-    svelte: SensorDesign,
+    coarse_svelte: SensorDesign,
 ) -> None:
     for contradicted in (False, True):
-        evaluator = slopes_of(method(svelte, MIRROR, resolution=RESOLUTION))
+        evaluator = slopes_of(method(coarse_svelte, MIRROR, resolution=RESOLUTION))
         evaluator._contradicted = contradicted
         space = evaluator.usual.space
         parts = evaluator(space.start + 0.01 * space.span, 0).parts["aoap"]
@@ -235,9 +229,9 @@ def test_derivatives_that_differences_contradict_at_the_start_are_checked_everyw
             assert parts[GRADIENT_BY] == GradientSource.RAYS.value
 
 
-def test_the_same_search_takes_the_same_steps(svelte: SensorDesign) -> None:
+def test_the_same_search_takes_the_same_steps(coarse_svelte: SensorDesign) -> None:
     space: dict[str, object] = {"cages.M1.blend": (0, 1)}
-    one, other = (method(svelte, space, resolution=RESOLUTION) for _ in range(2))
+    one, other = (method(coarse_svelte, space, resolution=RESOLUTION) for _ in range(2))
     evaluator = slopes_of(one)
     for _ in range(2):
         asked = one.ask()
@@ -247,8 +241,8 @@ def test_the_same_search_takes_the_same_steps(svelte: SensorDesign) -> None:
         other.tell(asked, outcomes)
 
 
-def test_what_conditions_limit_has_slopes(svelte: SensorDesign) -> None:
-    bound = SearchSpace({"cages.M1.points[13].x": Around(1.0)}).bind(freed(svelte, "M1"))
+def test_what_conditions_limit_has_slopes(coarse_svelte: SensorDesign) -> None:
+    bound = SearchSpace({"cages.M1.points[13].x": Around(1.0)}).bind(freed(coarse_svelte, "M1"))
     wanted = ["coverage >= 0", "distortion >= 0", "aoap - 0.2*distortion >= 0"]
     usual = DesignEvaluator(bound, ["aoap"], SETTINGS, requirements=wanted, apart=False)
     problem = Problem(bound, ("aoap",), 10, requirements=tuple(wanted))
@@ -262,12 +256,12 @@ def test_what_conditions_limit_has_slopes(svelte: SensorDesign) -> None:
     assert gradients[3] == pytest.approx(both, rel=1e-5)
 
 
-def test_an_ascent_ends_on_the_limit_of_its_conditions(svelte: SensorDesign) -> None:
+def test_an_ascent_ends_on_the_limit_of_its_conditions(coarse_svelte: SensorDesign) -> None:
     """The mirror that is best by AOAP alone shows the skin distorted."""
     given: dict[str, Any] = {"method": "gradient", "settings": SETTINGS, "budget": 12}
     given["options"] = {"resolution": RESOLUTION, "starts": 1}
     space = {"cages.M1.blend": (0.0, 1.0)}
-    found = search(svelte, space, "aoap", require="distortion <= 1.3", **given)
+    found = search(coarse_svelte, space, "aoap", require="distortion <= 1.3", **given)
     assert found.best.score > found.start.score
     kept = found.best.conditions["distortion <= 1.3"]
     assert kept is not None and 1.27 < kept <= 1.3
@@ -321,7 +315,7 @@ def test_scores_without_derivatives_of_rays_may_depend_on_other_numbers(
     ],
 )
 def test_what_has_no_gradient_is_refused(
-    svelte: SensorDesign, space: dict[str, object], message: str
+    coarse_svelte: SensorDesign, space: dict[str, object], message: str
 ) -> None:
     with pytest.raises(SearchError, match=message):
-        method(svelte, space)
+        method(coarse_svelte, space)

@@ -20,11 +20,6 @@ from optisense.search.space.search_space import SearchSpace
 RAYS = {"ray_resolution": (40, 30)}
 
 
-@pytest.fixture(scope="module")
-def svelte() -> SensorDesign:
-    return sensors.load("gelsight-svelte")
-
-
 def evaluator(design: SensorDesign, path: str) -> DesignEvaluator:
     bound = SearchSpace({path: (-100.0, 100.0)}).bind(design, tried=False)
     return DesignEvaluator(bound, ["aoap"], RAYS)
