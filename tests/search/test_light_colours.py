@@ -140,7 +140,3 @@ def test_other_spaces_are_refused(
 def test_a_star_stands_for_every_name(mini: SensorDesign) -> None:
     space = SearchSpace({"lights.*.flux": (1.0, 2.0)}).bind(mini)
     assert space.names == [f"lights.{name}.flux" for name in mini.lights]
-    with pytest.raises(SearchError, match="no name like 'x\\*'"):
-        SearchSpace({"lights.x*.flux": (1.0, 2.0)}).bind(mini)
-    with pytest.raises(SearchError, match=r"a \* stands for names"):
-        SearchSpace({"coating.*": (0.0, 1.0)}).bind(mini)
