@@ -91,7 +91,6 @@ class DaskRunner(Runner):
             self._client.close()
             raise
         self._executor = self._client.get_executor(pure=False, retries=0)
-        self.workers = sum(self._client.nthreads().values())
         self.window = SUBMITTED_AHEAD
 
     def submit(self, vector: NDArray[np.float64], seed: int) -> Future[Outcome]:

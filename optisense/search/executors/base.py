@@ -27,11 +27,9 @@ class Runner(ABC):
     outcome.
 
     Attributes:
-        workers: number of trials that are scored at once, as far as it is known.
         window: number of trials that should be submitted before the first is finished.
     """
 
-    workers: int = 1
     window: int = 1
 
     @abstractmethod

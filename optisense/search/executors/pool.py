@@ -87,7 +87,6 @@ class ProcessPool(Runner):
         """
         if workers < 1:
             raise SearchError(f"the number of workers is {workers}", hint="Give 1 or more")
-        self.workers = workers
         self.window = 4 * workers
         self._blob = pickled(evaluator)
         self._threads = threads or max(1, processors() // workers)
