@@ -18,6 +18,10 @@ _PAIRS_AT_ONCE = 500_000
 """Number of pairs of faces that are intersected together, which bounds the memory of the arrays to
 some 100 MB."""
 
+ROUNDS = 4
+"""Number of rounds in which two sets of boxes are reduced to those in the box around the other set;
+further rounds remove few."""
+
 
 class Crossings(NamedTuple):
     """Pairs of faces that cut through one another.
@@ -134,19 +138,25 @@ def overlapping_boxes(
 ) -> tuple[IntArray, IntArray]:
     """Return the pairs of boxes of two sets that overlap or touch, in no particular order.
 
-    A tree of rectangles finds the pairs that overlap when seen along the axis over which the boxes
+    Boxes that lie outside of the one around the other set are left out first. Then a tree of
+    rectangles finds the pairs that overlap when seen along the axis over which the boxes
     extend least, and few of these lie behind one another. The corners are (n, 3) and (k, 3), and
     the results the numbers (p,) in the first set and (p,) in the second.
     """
     from shapely import STRtree, box
 
-    reached_1 = _in_reach(low_1, high_1, low_2, high_2)
-    reached_2 = _in_reach(low_2, high_2, low_1, high_1)
-    if not (len(reached_1) and len(reached_2)):
-        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
-    low_1, high_1, low_2, high_2 = (
-        low_1[reached_1], high_1[reached_1], low_2[reached_2], high_2[reached_2],
-    )  # fmt: skip
+    boxes = [(low_1, high_1), (low_2, high_2)]
+    rows = [np.arange(len(low_1)), np.arange(len(low_2))]
+    for turn in range(2 * ROUNDS):
+        if not all(map(len, rows)):
+            break
+        this, (low, high), (other_low, other_high) = turn % 2, boxes[turn % 2], boxes[turn % 2 - 1]
+        near = ((low <= other_high.max(axis=0)) & (high >= other_low.min(axis=0))).all(axis=1)
+        if not near.all():
+            rows[this], boxes[this] = rows[this][near], (low[near], high[near])
+    if not all(map(len, rows)):
+        return rows[0][:0], rows[1][:0]
+    (low_1, high_1), (low_2, high_2) = boxes
     extent = np.maximum(high_1.max(axis=0), high_2.max(axis=0)) - np.minimum(
         low_1.min(axis=0), low_2.min(axis=0)
     )
@@ -154,7 +164,7 @@ def overlapping_boxes(
     tree = STRtree(box(*low_2[:, across].T, *high_2[:, across].T))
     one, other = tree.query(box(*low_1[:, across].T, *high_1[:, across].T))
     meet = (low_1[one, along] <= high_2[other, along]) & (high_1[one, along] >= low_2[other, along])
-    return reached_1[one[meet]], reached_2[other[meet]]
+    return rows[0][one[meet]], rows[1][other[meet]]
 
 
 def overlapping_pairs(low: FloatArray, high: FloatArray) -> tuple[IntArray, IntArray]:
@@ -164,13 +174,3 @@ def overlapping_pairs(low: FloatArray, high: FloatArray) -> tuple[IntArray, IntA
     one, other = overlapping_boxes(low, high, low, high)
     ordered = one < other
     return one[ordered], other[ordered]
-
-
-def _in_reach(
-    low: FloatArray, high: FloatArray, other_low: FloatArray, other_high: FloatArray
-) -> IntArray:
-    """Return the boxes that overlap the box around all others."""
-    if not len(other_low):
-        return np.zeros(0, dtype=np.int64)
-    reach = (low <= other_high.max(axis=0)) & (high >= other_low.min(axis=0))
-    return np.flatnonzero(reach.all(axis=1)).astype(np.int64)
