@@ -73,10 +73,6 @@ def read_mesh(path: Path) -> MeshArrays:
             _refuse_cut_off_stl(data, path)
         mesh = _load_with_trimesh(data, path, suffix)
     _refuse_many(len(mesh.faces), path)
-    if len(mesh.faces) == 0:
-        raise MeshError(
-            "the mesh file has no triangles", where=str(path), hint="Export a surface, not points"
-        )
     far = np.abs(mesh.vertices).max(axis=1, initial=0.0)
     if (far[np.isfinite(far)] > FARTHEST).any():
         number = int(np.flatnonzero((far > FARTHEST) & np.isfinite(far))[0])
@@ -84,6 +80,13 @@ def read_mesh(path: Path) -> MeshArrays:
             f"vertex {number + 1} is {far[number]:g} away from the origin",
             where=str(path),
             hint="Check the unit of the file, or export it again",
+        )
+    apart = mesh.normals is None and len(mesh.vertices) == 3 * len(mesh.faces)
+    if apart and np.isfinite(far).all():  # as in all STL files, which have no common vertices
+        mesh = MeshArrays(*welded(mesh.vertices, mesh.faces, WELD_DISTANCE))
+    if len(mesh.faces) == 0:
+        raise MeshError(
+            "the mesh file has no triangles", where=str(path), hint="Export a surface, not points"
         )
     twice = len(mesh.faces) - len(first_faces(mesh.faces, len(mesh.vertices)))
     if twice > MOST_TWICE:
@@ -158,9 +161,6 @@ def _load_with_trimesh(data: bytes, path: Path, suffix: str) -> MeshArrays:
         raise MeshError(
             f"the mesh file is malformed: {error}", where=str(path), hint="Export it again"
         ) from error
-    near = bool((np.abs(vertices) <= FARTHEST).all())  # others are refused, with their place
-    if suffix == ".stl" and near:
-        vertices, faces = welded(vertices, faces, WELD_DISTANCE)
     return MeshArrays(vertices, faces)
 
 

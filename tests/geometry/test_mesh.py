@@ -142,6 +142,17 @@ def test_plain_files_are_read_at_once_as_they_are_line_by_line(text: str, plain:
             np.testing.assert_array_equal(at_once.normals, by_line.normals)
 
 
+def test_a_file_whose_triangles_share_no_vertices_is_welded(tmp_path: Path) -> None:
+    mesh = box()
+    corners = mesh.triangles.reshape(-1, 3)
+    faces = np.arange(len(corners)).reshape(-1, 3)
+    TriangleMesh(corners, faces).save_obj(tmp_path / "apart.obj")
+    assert len(TriangleMesh.load(tmp_path / "apart.obj").vertices) == len(mesh.vertices)
+    own = np.repeat(mesh.face_normals, 3, axis=0)
+    TriangleMesh(corners, faces, own).save_obj(tmp_path / "flat.obj")
+    assert len(TriangleMesh.load(tmp_path / "flat.obj").vertices) == len(corners)
+
+
 def test_unreadable_files_are_mesh_errors(tmp_path: Path) -> None:
     with pytest.raises(MeshError, match="No such file"):
         TriangleMesh.load(tmp_path / "none.obj")

@@ -292,23 +292,36 @@ def _refracting_sheet(medium: Medium, design: SensorDesign) -> Surface:
 
 def _merged(mesh: TriangleMesh) -> TriangleMesh:
     """Return a mesh with flat facets merged into few triangles, which are traced faster."""
-    smooth = mesh if mesh.normals is not None else mesh.vertex_normals()
-    assert smooth.normals is not None
-    bend = np.abs(smooth.normals[smooth.faces] - smooth.face_normals[:, None]).max(axis=(1, 2))
-    if bend.max() < FLAT:
-        return merge_coplanar(mesh)
     # Only flat meshes are merged, as merging drops shading normals; a curved mesh may still have
     # flat walls.
-    return mesh
+    if not _is_flat(_shaded(mesh)):
+        return mesh
+    merged = merge_coplanar(mesh)
+    # Triangles that share no vertices tell nothing about their edges, as in STL files.
+    silent = mesh.normals is None and len(mesh.vertices) == 3 * len(mesh.faces)
+    if silent or _is_flat(_shaded(merged)):
+        return merged
+    corners = merged.triangles.reshape(-1, 3)
+    own = np.repeat(merged.face_normals, 3, axis=0)
+    return TriangleMesh(corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3), own)
 
 
 def _piece(name: str, mesh: TriangleMesh, surface: Surface) -> Piece:
-    smooth = mesh if mesh.normals is not None else mesh.vertex_normals()
-    assert smooth.normals is not None
-    corners = smooth.normals[smooth.faces]
-    if np.abs(corners - smooth.face_normals[:, None]).max() < FLAT:
+    smooth = _shaded(mesh)
+    if _is_flat(smooth):
         return Piece(name, mesh.vertices, mesh.faces, surface)
     return Piece(name, smooth.vertices, smooth.faces, surface, smooth.normals)
+
+
+def _shaded(mesh: TriangleMesh) -> TriangleMesh:
+    return mesh if mesh.normals is not None else mesh.vertex_normals()
+
+
+def _is_flat(mesh: TriangleMesh) -> bool:
+    """Return whether the shading normals of a mesh are those of its faces."""
+    assert mesh.normals is not None
+    corners = mesh.normals[mesh.faces] - mesh.face_normals[:, None]
+    return bool(np.abs(corners).max() < FLAT)
 
 
 def _emitters(design: SensorDesign, solids: list[Solid]) -> list[Emitter]:
