@@ -74,6 +74,18 @@ def test_refraction_follows_snell_and_fresnel(ray_kind: RayKind) -> None:
         assert np.allclose(np.asarray(step.reflection.weight), reflectance, rtol=1e-5)
 
 
+def test_a_rough_face_splits_camera_rays_by_the_shares_of_drawn_ones() -> None:
+    """All rays meet one facet; those of the camera go through, and carry their reflection along."""
+    rough = Surface(SurfaceKind.DIELECTRIC, eta=INDEX, alpha=0.3)
+    camera, drawn = met(rough, RayKind.CAMERA), met(rough, RayKind.REFLECTION)
+    way, weight = np.asarray(drawn.ray.direction).T, np.asarray(drawn.lobe.weight)[0]
+    for lobe, share in ((camera.lobe, way[:, 2] < 0), (camera.reflection, way[:, 2] > 0)):
+        assert np.allclose(np.asarray(lobe.direction).T, way[share][0], atol=1e-6)
+        expected = np.where(share, weight, 0).mean()
+        assert np.allclose(np.asarray(lobe.weight), expected, atol=1 / RAYS)
+        assert expected > 0.01
+
+
 @pytest.mark.parametrize("ray_kind", [RayKind.PHOTON, RayKind.CAMERA])
 def test_metal_reflects_as_in_the_medium_that_light_comes_from(ray_kind: RayKind) -> None:
     """The normal points to air; from behind, in gel, light meets the same metal as from the front

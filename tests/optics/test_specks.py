@@ -7,8 +7,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy import ndimage
 
+import optisense as ots
 from optisense import sensors
 from optisense.design import AreaEmitter, Dielectric, Light, SensorDesign
+from optisense.design.reflectance import fresnel_dielectric, ggx_density, smith_shadowing
 from optisense.geometry import Contact, Sphere, TriangleMesh
 from optisense.optics import OpticalModel
 from optisense.optics.imaging.lamp_images import without_specks
@@ -92,6 +94,68 @@ class TestMirroredLamp:
         bare = model.render([], (WIDTH, HEIGHT), 100_000, seed=0).unit_layers["green"][..., 1]
         touched = images[0].unit_layers["green"][..., 1]
         assert bare[close].sum() == pytest.approx(touched[close].sum(), rel=0.05)
+
+
+class TestGlare:
+    """A black skin behind the frosted face of a light guide, which scatters a lamp to the camera.
+
+    The radiance of a pixel is the integral of the lamp's radiance over its window, with the
+    microfacet BRDF of the face (Walter et al. 2007, equation 20). Light that enters the guide is
+    absorbed; what the other faces of the guide send back adds 2 %.
+    """
+
+    ALPHA, LAMP, SIDE = 0.3, (9.0, 2.0, -25.0), 4.0
+    SIZE = 64, 48
+    MEAN_ERROR = 0.07
+    """Relative error of the mean: these 2 %, and four standard errors."""
+    NOISE = 0.25
+    """Mean difference of pixels, relative to the mean: twice the noise of the glare; that of single
+    samples that meet the lamp is 2."""
+
+    def expected(self, design: SensorDesign) -> NDArray[np.float64]:
+        """Return the radiance (h, w) of the face for a lamp of 1 mW."""
+        width, height = self.SIZE
+        rows, columns = np.indices((height, width)) + 0.5
+        focal = width / 2 / np.tan(np.radians(design.camera.fov / 2))
+        eye = np.array(design.camera.position)
+        face = float(design.meshes["guide"].bounds[0, 2])
+        # The camera looks along +z with +y at the top, so that +x is at the left.
+        way = np.stack([width / 2 - columns, height / 2 - rows, np.full((height, width), focal)])
+        seen = eye[:, None, None] + way * ((face - eye[2]) / focal)
+        total = np.zeros((height, width))
+        steps = (np.arange(24) + 0.5) / 24 - 0.5
+        for x, y in np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2) * self.SIDE:
+            place = np.array(self.LAMP) + (x, y, 0)
+            light, view = place[:, None, None] - seen, eye[:, None, None] - seen
+            distance = np.linalg.norm(light, axis=0)
+            light, view = light / distance, view / np.linalg.norm(view, axis=0)
+            half = (light + view) / np.linalg.norm(light + view, axis=0)
+            cosine, towards = -light[2], -view[2]
+            brdf = fresnel_dielectric((half * view).sum(axis=0), self.index(design))
+            brdf *= ggx_density(-half[2], self.ALPHA) * smith_shadowing(cosine, self.ALPHA)
+            brdf *= smith_shadowing(towards, self.ALPHA) / (4 * cosine * towards)
+            total += brdf * cosine * cosine / distance**2
+        return total / steps.size**2 / np.pi
+
+    @staticmethod
+    def index(design: SensorDesign) -> float:
+        guide = design.materials["acrylic"]
+        assert isinstance(guide, Dielectric)
+        return guide.ior
+
+    def test_is_smooth_and_none_is_lost(self) -> None:
+        design = sensors.gelsight_mini_ideal()
+        design = ots.set_value(design, "coating.reflectance", (0.0, 0.0, 0.0))
+        faces = {"low": {"direction": (0, 0, -1), "within": 10, "roughness": self.ALPHA}}
+        design = ots.set_value(design, "parts.guide.faces", faces)
+        group = design.lights["green"]
+        group.emitter = AreaEmitter(shape="rectangle", size=(self.SIDE, self.SIDE))
+        group.lights = [Light(position=self.LAMP, direction=(0.0, 0.0, 1.0))]
+        image = OpticalModel(design).render([], self.SIZE, 10_000)
+        glare = image.unit_layers["green"][..., 1]
+        expected = self.expected(design)
+        assert glare.mean() == pytest.approx(expected.mean(), rel=self.MEAN_ERROR)
+        assert np.abs(glare - expected).mean() < self.NOISE * expected.mean()
 
 
 def steep() -> SensorDesign:

@@ -82,11 +82,12 @@ def render_cached(
         windows: the windows of the lights, which may be in view.
         plan: the pixels that are shaded, and their samples.
         known: parts of an earlier draft that are reused, to which those that are missing are added.
-        lamps: mirror images of lamps, which are added to the image.
+        lamps: mirror images and glare of lamps, which are added to the image; None if it has the
+            lamps that single samples meet beyond rough faces, as in drafts.
     """
     cache, interrupted = light
     regions = PixelRegions.of(rays)
-    image = _Shading(cache, scenes, camera, windows, regions, seed, plan, known)
+    image = _Shading(cache, scenes, camera, windows, regions, seed, plan, known, lamps is not None)
     samples = [1]
     if regions.near.any():
         image.sample_near()
@@ -143,10 +144,12 @@ class _Shading:
         seed: int,
         plan: SamplingPlan,
         known: KnownView | None,
+        glare_apart: bool,
     ) -> None:
         self.cache, self.scenes, self.camera, self.windows = cache, scenes, camera, windows
         self.regions, self.seed, self.plan, self.known = regions, seed, plan, known
         self.size = camera.width, camera.height
+        self.glare_apart = glare_apart  # whether lamps beyond rough faces are left to `LampImages`
         self.faint_known = known is not None and known.faint is not None
         self.effort = DRAG_EFFORT if self.faint_known else FULL_EFFORT
         self.film, self.between, self.mirrored = (
@@ -221,6 +224,8 @@ class _Shading:
                     self.between.add(main, exchanged)
             else:
                 self.film.add(main, self._shade(main, False))
+            if self.glare_apart:
+                main.light = dr.select(main.scattered, 0, main.light)
             self.film.add_light(main, self.windows)
             if reflected is not None:
                 self.mirrored.add(reflected, self._shade(reflected, True))

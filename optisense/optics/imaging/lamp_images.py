@@ -1,4 +1,4 @@
-"""Mirror images of lamps: the light of lamps that interfaces reflect to the camera."""
+"""Light of lamps that interfaces send to the camera: mirror images, and glare of rough faces."""
 
 from __future__ import annotations
 
@@ -11,7 +11,13 @@ from scipy import ndimage
 
 from optisense.optics.backend.sequences import seed_of
 from optisense.optics.camera.projection import RayCamera
-from optisense.optics.imaging._film import Film, averaged_twice, box_around, repeated
+from optisense.optics.imaging._film import (
+    Film,
+    average_pixels,
+    averaged_twice,
+    box_around,
+    repeated,
+)
 from optisense.optics.scene.lamp_windows import LampWindows
 from optisense.optics.scene.ray_scene import RayScene
 from optisense.optics.transport.camera_paths import film_samples, find_visible_points
@@ -29,6 +35,22 @@ STEADY_SHARE = 1 / 8
 contact of GelSight360 with a perspective camera, where interfaces mirror the ring of blue lamps, 22
 of 25 lone pixels have this share. One path in a thousand causes a speck."""
 
+GLARE_BATCHES = 4
+"""Number of batches of such paths that sample glare; the noise is known from their differences. For
+an image of 320x240 pixels, these are 16 paths through each pixel, traced once for all images of a
+sensor."""
+GLARE_NOISE = 0.03
+"""Noise of glare, relative to it, below which it is not averaged: three times a camera's own noise,
+which is about 0.01."""
+GLARE_EDGE = 4.0
+"""Difference between the averages with two kernels, in standard errors, above which glare counts as
+sharp and has the narrower one, if as many of these errors are less than the glare. Where a face of
+roughness 0.01 shows the outline of a lamp, the glare is 2 % too bright without it."""
+GLARE_WIDTHS = 1 / 16, 1 / 32, 1 / 64, 1 / 128, 0.0
+"""Half widths of the kernels that average glare, as fractions of the image width. Each pixel has
+the narrowest with which its noise is low. The widest leaves a noise of 3 % of the glare that a wide
+lamp causes on a face of roughness 0.3, at 320x240 pixels."""
+
 LONE_WINDOW, LONE_RANK = 5, 4
 """Side (pixels) of the square around a bright pixel, and the number of its pixels, itself included,
 that must be bright for the pixel not to count as lone."""
@@ -45,13 +67,14 @@ Knopp 1967). Even light in a square twice as wide as the kernel then varies by 1
 
 
 class LampImages:
-    """The mirror images of the lamps of a sensor.
+    """The mirror images of the lamps of a sensor, and their glare on rough faces.
 
-    Interfaces reflect this light to the camera before it reaches the skin, so that it does not
-    depend on contacts. The image that was made last is kept: images with and without contacts,
-    which are subtracted from each other, then have the same mirror images. Lamps are so bright that
-    a rare path (one in a thousand) that meets one causes a speck. The light of specks is spread
-    over the pixels around them.
+    Interfaces send this light to the camera before it reaches the skin, so that it does not depend
+    on contacts. The image that was made last is kept: images with and without contacts, which are
+    subtracted from each other, then have the same mirror images. Lamps are so bright that a rare
+    path (one in a thousand) that meets one causes a speck. The light of specks is spread over the
+    pixels around them. Glare, which rough faces scatter, is smooth, and is averaged over the pixels
+    around each where few paths meet a lamp.
     """
 
     def __init__(self, scene: RayScene, windows: LampWindows, groups: int) -> None:
@@ -62,33 +85,44 @@ class LampImages:
         """
         self._scene, self._windows, self._groups = scene, windows, groups
         self._kept: tuple[tuple[int, int, int], NDArray[np.float32]] | None = None
-        self._found: bool | None = None
+        self._found: tuple[bool, bool] | None = None  # whether there are mirror images, glare
 
     def layers(self, camera: RayCamera, seed: int) -> NDArray[np.float32] | None:
-        """Return the layers (groups, h, w, 3) of the image of a camera; None if there are no mirror
-        images.
+        """Return the layers (groups, h, w, 3) of the image of a camera; None if there is no such
+        light.
 
         The camera may differ from that of the call before only in its resolution.
         """
         if self._found is None:
-            self._found = False
-            if not self._windows.exist:
-                return None  # no lamp has a window
             height = max(1, round(SEARCH_WIDTH * camera.height / camera.width))
             small = replace(camera, width=SEARCH_WIDTH, height=height)
-            _, meetings = self._traced(small, np.ones((height, SEARCH_WIDTH), bool), LAMP_PATHS, 0)
-            self._found = bool(meetings.any())
-        if not self._found:
+            everywhere = np.ones((height, SEARCH_WIDTH), dtype=bool)
+
+            def meet(glare: bool) -> bool:
+                layers, _ = self._traced(small, everywhere, LAMP_PATHS, 0, glare)
+                return bool(layers.any())
+
+            exist = self._windows.exist
+            self._found = exist and meet(False), exist and self._scene.rough and meet(True)
+        if not any(self._found):
             return None
         key = camera.width, camera.height, seed
         if self._kept is None or self._kept[0] != key:
-            self._kept = key, self._image(camera, seed)
+            everywhere = np.ones((camera.height, camera.width), dtype=bool)
+            paths = max(1, round(LAMP_PATHS * SEARCH_WIDTH / camera.width))
+            mirrored, glare = self._found
+            layers = np.zeros((self._groups, *everywhere.shape, 3), dtype=np.float32)
+            if mirrored:
+                layers += self._mirrored(camera, everywhere, paths, seed)
+            if glare:
+                layers += self._glare(camera, everywhere, paths, seed)
+            self._kept = key, layers
         return self._kept[1]
 
-    def _image(self, camera: RayCamera, seed: int) -> NDArray[np.float32]:
-        """Return the layers (groups, h, w, 3) of an image of a sensor with mirror images."""
-        everywhere = np.ones((camera.height, camera.width), dtype=bool)
-        paths = max(1, round(LAMP_PATHS * SEARCH_WIDTH / camera.width))
+    def _mirrored(
+        self, camera: RayCamera, everywhere: NDArray[np.bool_], paths: int, seed: int
+    ) -> NDArray[np.float32]:
+        """Return the layers of mirror images, by a number of paths through each pixel."""
         layers, _ = self._traced(camera, everywhere, paths, seed_of(seed, 11))
         lone = np.zeros_like(everywhere)
         for layer in layers:
@@ -103,27 +137,80 @@ class LampImages:
         steady = ndimage.binary_dilation(steady, beside, mask=around)
         return without_specks(np.where(steady[..., None], again, layers), steady)
 
+    def _glare(
+        self, camera: RayCamera, everywhere: NDArray[np.bool_], paths: int, seed: int
+    ) -> NDArray[np.float32]:
+        """Return the layers of glare, by some batches of such paths."""
+        frosted = np.zeros_like(everywhere)
+        mean = np.zeros((self._groups, *everywhere.shape, 3), dtype=np.float32)
+        square = np.zeros_like(mean)
+        for number in range(GLARE_BATCHES):
+            batch, rough = self._traced(camera, everywhere, paths, seed_of(seed, 14, number), True)
+            mean += batch / GLARE_BATCHES
+            square += batch**2 / GLARE_BATCHES
+            frosted |= rough > 0
+        variance = np.maximum(square - mean**2, 0) / (GLARE_BATCHES - 1)
+        return _steadied(mean, variance, frosted)
+
     def _traced(
-        self, camera: RayCamera, pixels: NDArray[np.bool_], paths: int, seed: int
+        self,
+        camera: RayCamera,
+        pixels: NDArray[np.bool_],
+        paths: int,
+        seed: int,
+        glare: bool = False,
     ) -> tuple[NDArray[np.float32], NDArray[np.floating]]:
-        """Return the lamps' layers (groups, h, w, 3) by paths through pixels, and their number."""
+        """Return the lamps' layers (groups, h, w, 3) by paths through pixels, and the number (h, w)
+        of these paths: with ``glare`` those that meet a rough face, also if they meet no lamp.
+        """
         pixel, number = repeated(pixels, paths)
         dr.eval(pixel, number)
         spots = film_samples(pixel, camera.width, number, seed)
         film = Film(pixels.size, self._groups)
         film.count(pixel)
-        meetings = np.zeros(pixels.size)
+        count = np.zeros(pixels.size)
         channels = self._scene.channels
         for channel in channels:
-            _, points = find_visible_points(
+            main, reflected = find_visible_points(
                 self._scene, camera, pixel, number, spots, seed_of(seed, 1), channel=channel
             )
-            if points is not None:
+            for points in (main, reflected) if glare else (reflected,):
+                if points is None:
+                    continue
+                points.light = dr.select(points.scattered == glare, points.light, 0)
                 film.add_light(points, self._windows)
-                lit = np.asarray(points.light) > 0
-                meetings += np.bincount(np.asarray(points.pixel), lit, pixels.size)
+                counted = points.scattered if glare else points.light > 0
+                count += np.bincount(np.asarray(points.pixel), np.asarray(counted), pixels.size)
         layers = film.layers(camera.width, camera.height)
-        return layers, meetings.reshape(pixels.shape) / len(channels)
+        return layers, count.reshape(pixels.shape) / len(channels)
+
+
+def _steadied(
+    layers: NDArray[np.float32], variance: NDArray[np.float32], region: NDArray[np.bool_]
+) -> NDArray[np.float32]:
+    """Return layers (groups, h, w, 3), each pixel of a region (h, w) of which is averaged over as
+    many others of the region around it as its noise requires.
+    """
+    # The noise with a kernel is known from the averages with the next wider one: if it were known
+    # from its own, pixels that are too bright by chance would be averaged less.
+    samples = region.astype(np.float32)
+    found, steady = layers, np.broadcast_to(region, layers.shape[:3])
+    wider, square = layers, np.zeros_like(layers)
+    for width in GLARE_WIDTHS:
+        reach = round(width * layers.shape[2]) | 1
+        mean, spread = layers.copy(), variance.copy()
+        if reach > 1:
+            average_pixels(mean, samples, region, reach, deblurred=True)
+            average_pixels(spread, samples, region, reach, deblurred=False)
+        # The inverse of the sum of the squares of the kernel, which is triangular each way.
+        pixels = (3 * reach**3 / (2 * reach**2 + 1)) ** 2
+        error = np.sqrt(square / pixels).sum(axis=-1)
+        bright = wider.sum(axis=-1)
+        apart = np.abs(mean.sum(axis=-1) - bright) > GLARE_EDGE * error
+        steady = steady & ((error <= GLARE_NOISE * bright) | apart & (error <= bright / GLARE_EDGE))
+        found = np.where(steady[..., None], mean, found)
+        wider, square = mean, spread
+    return found
 
 
 def without_specks(

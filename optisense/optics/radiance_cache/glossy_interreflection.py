@@ -151,6 +151,7 @@ def _secondary_hits(
         towards_eye=-direction,
         surface=dr.select(raised, pressed.surface, skin.surface),
         light=mi.UInt32(0),
+        scattered=mi.Bool(False),
         pixel=points.pixel,
         random=random,
         series=next_random(random ^ points.series),

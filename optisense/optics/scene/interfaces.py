@@ -127,6 +127,42 @@ def refract(
     return reflectance, dr.normalize(reflected), dr.normalize(transmitted), eta_it
 
 
+def rough_lobes(
+    incoming: mi.Vector3f,
+    normal: mi.Vector3f,
+    eta: mi.Float,
+    alpha: mi.Float,
+    sample: mi.Point2f,
+) -> tuple[mi.Float, mi.Vector3f, mi.Float, mi.Vector3f, mi.Float, mi.Float]:
+    """Draw a micro-facet of a rough (GGX) interface, which splits light in two (Walter et al.
+    2007).
+
+    Args:
+        incoming: unit directions in which the light travels.
+        normal: unit normals.
+        eta: index behind the normal over the index in front of it, (n,).
+        alpha: GGX roughness (n,).
+        sample: random point of the unit square that chooses the micro-facet.
+
+    Returns:
+        The Fresnel reflectance (n,); the direction (3, n) and the weight (n,) of the reflected
+        light, then those of the transmitted light; and the index of the far side over that of the
+        near side (n,).
+    """
+    facing = normal * dr.sign(-dr.dot(incoming, normal))
+    frame = mi.Frame3f(facing)
+    half = frame.to_world(sample_ggx(frame.to_local(-incoming), alpha, sample))
+    inside = dr.dot(facing, normal) < 0
+    relative = dr.select(inside, dr.rcp(eta), eta)
+    reflectance, reflected, transmitted, eta_it = refract(incoming, half, relative)
+
+    def kept(cosine: mi.Float) -> mi.Float:
+        return dr.select(cosine > 0, smith_g1(cosine, alpha), 0.0)
+
+    turned, passed = kept(dr.dot(reflected, facing)), kept(-dr.dot(transmitted, facing))
+    return reflectance, reflected, turned, transmitted, passed, eta_it
+
+
 def sample_rough_interface(
     incoming: mi.Vector3f,
     normal: mi.Vector3f,
@@ -135,29 +171,20 @@ def sample_rough_interface(
     pick: mi.Float,
     sample: mi.Point2f,
 ) -> tuple[mi.Vector3f, mi.Float, mi.Bool, mi.Float]:
-    """Draw a direction at a rough (GGX) interface (Walter et al. 2007).
+    """Draw a direction at a rough interface.
 
     Args:
-        incoming: unit directions in which the light travels.
-        normal: unit normals.
-        eta: index behind the normal over the index in front of it, (n,).
-        alpha: GGX roughness (n,).
+        incoming, normal, eta, alpha, sample: as in `rough_lobes`.
         pick: random number (n,) in [0, 1) that chooses reflection or transmission.
-        sample: random point of the unit square that chooses the micro-facet.
 
     Returns:
         The unit direction (3, n); its weight (n,); whether it is transmitted (n,); and the index on
         its side over the index on the side that the light comes from (n,), 1 for reflection.
     """
-    facing = normal * dr.sign(-dr.dot(incoming, normal))
-    frame = mi.Frame3f(facing)
-    half = frame.to_world(sample_ggx(frame.to_local(-incoming), alpha, sample))
-    inside = dr.dot(facing, normal) < 0
-    relative = dr.select(inside, dr.rcp(eta), eta)
-    reflectance, reflected, transmitted, eta_it = refract(incoming, half, relative)
+    reflectance, reflected, turned, transmitted, passed, eta_it = rough_lobes(
+        incoming, normal, eta, alpha, sample
+    )
     through = pick >= reflectance
     outgoing = dr.select(through, transmitted, reflected)
-    cosine = dr.dot(outgoing, facing)
-    proper = dr.select(through, cosine < 0, cosine > 0)
-    weight = dr.select(proper, smith_g1(dr.abs(cosine), alpha), 0.0)
+    weight = dr.select(through, passed, turned)
     return outgoing, weight, through, dr.select(through, eta_it, 1.0)

@@ -1,9 +1,8 @@
 """The camera pass: paths from the pixels to the points of the coating that they see.
 
-The main path of a pixel sample always goes through smooth interfaces (weighted with the
-transmittance), so the image has no noise of randomly drawn Fresnel reflections. The reflections at
-interfaces are followed by one further path per sample, whose branch is drawn in proportion to its
-weight.
+The main path of a pixel sample always goes through interfaces (weighted with the transmittance), so
+the image has no noise of randomly drawn Fresnel reflections. The reflections at interfaces are
+followed by one further path per sample, whose branch is drawn in proportion to its weight.
 """
 
 from __future__ import annotations
@@ -35,6 +34,7 @@ class PathEnd:
         towards_eye: unit vector back along the path.
         surface: the surface's number.
         light: the number + 1 of the light whose emitting face the path ends on, else 0.
+        scattered: mask of the paths that meet a rough interface.
     """
 
     valid: mi.Bool
@@ -45,6 +45,7 @@ class PathEnd:
     towards_eye: mi.Vector3f
     surface: mi.UInt32
     light: mi.UInt32
+    scattered: mi.Bool
 
 
 @dataclass
@@ -74,6 +75,7 @@ class Paths:
         branch: for each path from the camera one of its reflections at interfaces, drawn in
             proportion to its weight; of other paths, inactive rays.
         branch_weight: sum (3, n) of the weights of its reflections.
+        branch_scattered: mask of the branches that have met a rough interface.
         stopped: the rays that meet a rough interface before which the paths stop; of other paths,
             inactive rays.
         stopped_weight: factor (3, n) on the radiance at the origins of these rays.
@@ -82,6 +84,7 @@ class Paths:
     end: PathEnd
     branch: Ray
     branch_weight: mi.Color3f
+    branch_scattered: mi.Bool
     stopped: Ray
     stopped_weight: mi.Color3f
 
@@ -110,6 +113,7 @@ def follow(
     begins = mi.Bool(True)
     found = mi.Bool(False)
     light = mi.UInt32(0)
+    scattered = mi.Bool(False)
     point = mi.Point3f(0)
     normal = mi.Vector3f(0, 0, 1)
     face_normal = mi.Vector3f(0, 0, 1)
@@ -119,6 +123,7 @@ def follow(
     branch_origin = mi.Point3f(0)
     branch_direction = mi.Vector3f(0, 0, 1)
     branch_absorption = ray.absorption
+    branch_scattered = mi.Bool(False)
     stopped_origin = mi.Point3f(0)
     stopped_direction = mi.Vector3f(0, 0, 1)
     stopped_weight = mi.Color3f(0)
@@ -145,6 +150,8 @@ def follow(
         towards_eye = dr.select(ends, -ray.direction, towards_eye)
         surface = dr.select(seen, hit.surface, surface)
         found |= seen
+        if dr.hint(scene.rough, mode="scalar"):
+            scattered |= step.rough
         if dr.hint(until_rough, mode="scalar"):
             stopped_origin = dr.select(step.rough, ray.origin, stopped_origin)
             stopped_direction = dr.select(step.rough, ray.direction, stopped_direction)
@@ -155,22 +162,25 @@ def follow(
         weight *= step.transmittance
         if dr.hint(ray_kind is RayKind.CAMERA, mode="scalar"):
             branch = weight * step.reflection.weight
+            if dr.hint(until_rough, mode="scalar"):
+                branch = dr.select(step.rough, 0, branch)
             total += branch
             chosen = dr.max(branch) > 0
             chosen &= rng.next_float32() * grey(total) < grey(branch)
             away = step.reflection.direction
             branch_origin = dr.select(chosen, leave(hit.point, hit.normal, away), branch_origin)
             branch_direction = dr.select(chosen, away, branch_direction)
+            branch_scattered = dr.select(chosen, scattered, branch_scattered)
             if dr.hint(scene.absorbing, mode="scalar"):
                 branch_absorption = dr.select(chosen, step.absorption, branch_absorption)
         weight = dr.select(step.goes_on, weight * step.lobe.weight, weight)
         ray = step.ray
-    end = PathEnd(found, weight, point, normal, face_normal, towards_eye, surface, light)
+    end = PathEnd(found, weight, point, normal, face_normal, towards_eye, surface, light, scattered)
     branched = Ray(branch_origin, branch_direction, dr.max(total) > 1e-5)
     branched.absorption, branched.channel = branch_absorption, ray.channel
     stopped = Ray(stopped_origin, stopped_direction, dr.max(stopped_weight) > 0)
     stopped.absorption, stopped.channel = stopped_absorption, ray.channel
-    return Paths(end, branched, total, stopped, stopped_weight)
+    return Paths(end, branched, total, branch_scattered, stopped, stopped_weight)
 
 
 def follow_branches(scene: RayScene, paths: Paths, lanes: mi.UInt32, bits: mi.UInt32) -> PathEnd:
@@ -181,7 +191,9 @@ def follow_branches(scene: RayScene, paths: Paths, lanes: mi.UInt32, bits: mi.UI
         bits: random bits (k,) of each of these.
     """
     ray, weight = gathered(paths.branch, lanes), dr.gather(mi.Color3f, paths.branch_weight, lanes)
-    return follow(scene, ray, weight, generator(bits), RayKind.REFLECTION).end
+    end = follow(scene, ray, weight, generator(bits), RayKind.REFLECTION).end
+    end.scattered |= dr.gather(mi.Bool, paths.branch_scattered, lanes)
+    return end
 
 
 MAX_PIXEL_SAMPLES = 64

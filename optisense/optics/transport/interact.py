@@ -14,7 +14,12 @@ import drjit as dr
 import mitsuba as mi
 
 from optisense.optics.scene.coating_bsdf import coating_of, fresnel_metal, sample_coating
-from optisense.optics.scene.interfaces import SMOOTH_ALPHA, refract, sample_rough_interface
+from optisense.optics.scene.interfaces import (
+    SMOOTH_ALPHA,
+    refract,
+    rough_lobes,
+    sample_rough_interface,
+)
 from optisense.optics.scene.ray_scene import Ray, RayScene, SurfaceHit, leave
 from optisense.optics.scene.surface_table import (
     channel_eta,
@@ -41,7 +46,7 @@ class RayKind(Enum):
     """The kind of a ray, which decides the quantity it carries and the lobe it follows."""
 
     PHOTON = 0  # carries power; a lobe is drawn, and opaque surfaces scatter
-    CAMERA = 1  # carries radiance; goes through every interface that is not totally reflecting
+    CAMERA = 1  # carries radiance; goes through all interfaces and facets that do not reflect all
     REFLECTION = 2  # carries radiance; at interfaces a lobe is drawn
     CHIEF = 3  # carries nothing; as from the camera, and every interface is smooth to it
 
@@ -107,7 +112,7 @@ class Interaction:
         rough: mask of the rays that meet a rough interface.
         turned: mask of the rays that are reflected, by a mirror or at an interface.
         lobe: the lobe that the ray follows.
-        reflection: the reflected lobe of a smooth interface through which the ray continues; of
+        reflection: the reflected lobe of an interface through which a camera ray continues; of
             weight 0 elsewhere.
         absorption: the absorption coefficient (1/mm) of the medium that the ray came through; None
             in a scene without absorption.
@@ -164,6 +169,30 @@ def _media(
     return _Media(known, before, behind, here)
 
 
+def _rough(
+    ray: Ray,
+    ray_kind: RayKind,
+    hit: SurfaceHit,
+    eta: mi.Float,
+    alpha: mi.Float,
+    drawn: LobeSample,
+) -> tuple[mi.Vector3f, mi.Color3f, mi.Vector3f, mi.Float]:
+    """Return the direction in which rays continue from a rough interface and its weight, then those
+    of the light that is reflected beside it.
+    """
+    place = ray.direction, hit.shading_normal, eta, alpha
+    if ray_kind.draws:
+        outgoing, weight, _, ratio = sample_rough_interface(*place, drawn.pick, drawn.place)
+        if ray_kind.carries_radiance:
+            weight /= ratio * ratio
+        return outgoing, mi.Color3f(weight), outgoing, mi.Float(0)
+    reflectance, reflected, turned, transmitted, passed, ratio = rough_lobes(*place, drawn.place)
+    through = reflectance < 1
+    weight = dr.select(through, (1 - reflectance) * passed / (ratio * ratio), turned)
+    beside = dr.select(through, reflectance * turned, 0)
+    return dr.select(through, transmitted, reflected), mi.Color3f(weight), reflected, beside
+
+
 @dr.syntax
 def interact(
     scene: RayScene, ray: Ray, ray_kind: RayKind, sample: LobeSample | None = None
@@ -212,12 +241,7 @@ def interact(
         if dr.hint(
             interface & (alpha > SMOOTH_ALPHA), exclude=[ray, ray_kind, hit, eta, alpha, drawn]
         ):
-            outgoing, kept, _through, ratio = sample_rough_interface(
-                ray.direction, hit.shading_normal, eta, alpha, drawn.pick, drawn.place
-            )
-            if dr.hint(ray_kind.carries_radiance, mode="scalar"):
-                kept = kept / (ratio * ratio)
-            weight = mi.Color3f(kept)
+            outgoing, weight, reflected, beside = _rough(ray, ray_kind, hit, eta, alpha, drawn)
     if dr.hint(ray_kind is not RayKind.CHIEF, mode="scalar"):  # noqa: SIM102
         if dr.hint(
             scattered, exclude=[scene, ray, ray_kind, hit, side, eta, mirror, drawn, scattered]
