@@ -33,13 +33,14 @@ def summary(result: SearchResult) -> dict[str, Any]:
     trials = result.trials
     best = result.study.best
     start = result.study.start
+    scored = [trial for trial in trials if math.isfinite(trial.score)]
     return {
         "study": str(result.study.folder),
         "trials": sum(not trial.is_start for trial in trials),
-        "failed": sum(trial.failure is not None for trial in trials),
+        "failed": len(trials) - len(scored),
         "interrupted": result.interrupted,
         "ended": result.ended,
-        "broken": sum(trial.failure is None and not trial.is_feasible for trial in trials),
+        "broken": sum(not trial.is_feasible for trial in scored),
         "notes": list(result.notes),
         "start": None if start is None else _plain(start),
         "best": None if best is None else _plain(best),
@@ -66,15 +67,15 @@ def _several(result: SearchResult) -> bool:
 def print_result(result: SearchResult, out: Path) -> None:
     """Print the best trial, the numbers beside its score, and the next commands."""
     from optisense.search.study.conditions import condition_lines
+    from optisense.search.study.failures import incomplete
 
     study = result.study
     print_notes(result.notes)
     if not result.interrupted:
         output.print(_end(result))
     best, start = study.best, study.start
-    failed = [trial for trial in result.trials if trial.failure is not None]
-    if failed:
-        output.print(_failures(failed))
+    for kind, members in incomplete(result.trials).items():
+        output.print(_failures(kind, members))
     if best is None:
         _print_nearest(result.trials)
         return
@@ -95,7 +96,7 @@ def print_result(result: SearchResult, out: Path) -> None:
         output.print(f"  {path} = {shown}")
     if len(values) > MOST_VALUES:
         output.print(f"  and {len(values) - MOST_VALUES} more")
-    if _several(result):
+    if _several(result) and result.front:
         _print_front(result)
     if best.is_start:
         by = f" by {name}, the first objective" if _several(result) else ""
@@ -156,12 +157,12 @@ def _is_noise(best: Trial, start: Trial) -> bool:
     return best.unbiased_score - start.unbiased_score <= CERTAINTY * noise
 
 
-def _failures(failed: Sequence[Trial]) -> str:
-    """Return the number of failed trials, and the most frequent causes."""
-    from optisense.search.study.failures import by_cause
+def _failures(kind: str, trials: Sequence[Trial]) -> str:
+    """Return the number of trials of a kind (see `incomplete`), and the most frequent causes."""
+    from optisense.search.study.failures import causes_among
 
-    causes = by_cause((trial.number, trial.failure or "") for trial in failed)
-    lines = [f"{len(failed)} {'trial' if len(failed) == 1 else 'trials'} failed:"]
+    causes = causes_among(trials)
+    lines = [f"{len(trials)} {'trial' if len(trials) == 1 else 'trials'} {kind}:"]
     lines += [f"  {len(each.numbers)}  {each.text}" for each in causes[:MOST_CAUSES]]
     if len(causes) > MOST_CAUSES:
         lines.append(f"  and {len(causes) - MOST_CAUSES} more causes")
@@ -174,7 +175,8 @@ def _beside(study: Study, best: Trial, start: Trial | None) -> list[str]:
 
     before = {} if start is None else beside(study, start)
     return [
-        f"  {name} {value:.4g}" + (f" (start {before[name]:.4g})" if name in before else "")
+        f"  {name} {_number(value)}"
+        + (f" (start {_number(before[name])})" if name in before else "")
         for name, value in beside(study, best).items()
     ]
 
@@ -187,3 +189,7 @@ def _print_front(result: SearchResult) -> None:
         table.add_row(str(trial.number), *(f"{trial.scores[name]:.4g}" for name in names))
     output.print("Pareto front (no trial is better in all objectives):")
     output.print(table)
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}" if math.isfinite(value) else "failed"

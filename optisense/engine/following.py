@@ -116,7 +116,11 @@ class Following:
         new = [row for row in rows if row.number not in self._reported]
         self._reported.update(row.number for row in new)
         self._done = sum(row.generation >= 0 for row in rows)
-        self._failed = sum(row.generation >= 0 and _failed(row) for row in rows)
+        self._failed = sum(
+            row.generation >= 0 and bool(row.outcome.lacking([study.objective]))
+            for row in rows
+            if row.outcome is not None
+        )
         if self._time_left is None:
             self._time_left = TimeLeft(self._total(study), self._done)
         said = self._in_words(study)
@@ -191,10 +195,6 @@ def _score(row: Row, objective: str) -> float:
     return score if math.isfinite(score) else -math.inf
 
 
-def _failed(row: Row) -> bool:
-    return row.outcome is not None and row.outcome.failed
-
-
 def curve_row(trial: Trial) -> dict[str, Any]:
     """Return a point of the curve of scores."""
     return {
@@ -202,7 +202,7 @@ def curve_row(trial: Trial) -> dict[str, Any]:
         "start": trial.is_start,
         "scores": trial.scores,
         "failure": trial.failure,
-        "feasible": trial.failure is None and trial.is_feasible,
+        "feasible": math.isfinite(trial.score) and trial.is_feasible,
     }
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from optisense.report.before_after import RayFigures
 from optisense.search.evaluation.outcome import rank_of
 from optisense.search.study.conditions import condition_results, is_worse
-from optisense.search.study.failures import by_cause
+from optisense.search.study.failures import FAILED, causes_among, incomplete
 from optisense.search.study.study import Study, beside
 from optisense.search.study.trial import Trial
 
@@ -200,14 +200,21 @@ def trials(study: Study, found: Sequence[Trial], columns: Sequence[int]) -> Tabl
     return Table(heads, rows).without_empty_columns()
 
 
-def failures(found: Sequence[Trial]) -> tuple[Table, int]:
-    """Return the causes of failure, the most frequent first, and the number of omitted ones."""
-    causes = by_cause((t.number, t.failure) for t in found if t.failure is not None)
-    rows = [
-        [each.text, str(len(each.numbers)), f"trial {each.numbers[0]}: {each.example}"]
-        for each in causes[:MOST_CAUSES]
-    ]
-    return Table(["cause", "trials", "such as"], rows), max(0, len(causes) - MOST_CAUSES)
+def failures(found: Sequence[Trial]) -> list[tuple[str, Table, int]]:
+    """Return a heading for each kind of trials that lack a value, the causes, the most frequent
+    first, and the number of omitted ones.
+    """
+    tables = []
+    for kind, members in incomplete(found).items():
+        causes = causes_among(members)
+        rows = [
+            [each.text, str(len(each.numbers)), f"trial {each.numbers[0]}: {each.example}"]
+            for each in causes[:MOST_CAUSES]
+        ]
+        heading = "Failed trials" if kind == FAILED else f"Trials {kind}"
+        table = Table(["cause", "trials", "such as"], rows)
+        tables.append((heading, table, max(0, len(causes) - MOST_CAUSES)))
+    return tables
 
 
 def settings(study: Study) -> list[tuple[str, str]]:

@@ -29,6 +29,7 @@ from optisense.report.tolerance import shown_size
 from optisense.search.methods import find
 from optisense.search.study.best import best_of, front_among, nearest, newer_note
 from optisense.search.study.conditions import condition_note, worsened_note
+from optisense.search.study.failures import incomplete, incomplete_note
 from optisense.search.study.study import Study
 from optisense.search.study.trial import Trial
 from optisense.writing import write_text
@@ -113,7 +114,6 @@ def render_study(
     after = _design(best)
     cages = [] if after is None else cage_changes(study.space.design, after)
     changes = tables.changes(study, start, best, bool(cages))
-    failures, more_causes = tables.failures(trials)
     return page(
         "study",
         title=study.space.design.name,
@@ -136,7 +136,12 @@ def render_study(
         conditions=tables.conditions(study, start, best or nearest(trials)),
         warnings=[
             note
-            for note in (newer_note(trials), condition_note(trials), worsened_note(best, start))
+            for note in (
+                newer_note(trials),
+                incomplete_note(best),
+                condition_note(trials),
+                worsened_note(best, start),
+            )
             if note is not None
         ],
         no_fresh=tables.why_no_fresh(study, trials),
@@ -155,8 +160,7 @@ def render_study(
         trials=tables.trials(study, trials, strongest[:MOST_COLUMNS]),
         finished=len(trials),
         tried=_tried(trials),
-        failures=failures,
-        more_causes=more_causes,
+        failures=tables.failures(trials),
         settings=tables.settings(study),
         live=live,
         data=as_json(
@@ -216,10 +220,8 @@ def _headline(study: Study, trials: Sequence[Trial], best: Trial | None) -> list
     facts = [("method", settings.method), ("objectives", ", ".join(settings.names))]
     count = sum(not trial.is_start for trial in trials)
     facts.append(("trials", f"{count:,} of {study.budget:,}"))
-    failed = sum(trial.failure is not None for trial in trials)
-    if failed:
-        facts.append(("failed", f"{failed:,}"))
-    broken = sum(trial.failure is None and not trial.is_feasible for trial in trials)
+    facts += [(kind, f"{len(members):,}") for kind, members in incomplete(trials).items()]
+    broken = sum(math.isfinite(trial.score) and not trial.is_feasible for trial in trials)
     if broken:
         facts.append(("break a condition", f"{broken:,}"))
     facts += [("parameters", f"{study.space.size:,}"), ("seed", str(settings.seed))]

@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 import subprocess
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from warm_python import programs
 
 import optisense as ots
 from optisense.cli import app
+from optisense.report.study import render_study
 from optisense.search import Study
 
 OBJECTIVE = """
@@ -257,6 +259,22 @@ def test_a_search_that_can_not_succeed_is_hinted_at(tmp_path: Path) -> None:
     found = run("gelsight-mini-ideal", "--vary", "camera.fov=50:60", "--budget", "1",
                 "--out", tmp_path / "view", "-b", "aoap")  # fmt: skip
     assert found.exit_code == 0 and "score alike" not in found.output
+
+
+def test_trials_without_a_further_value_have_not_failed(mine: Path, tmp_path: Path) -> None:
+    study = tmp_path / "study"
+    result = run("gelsight-mini-ideal", "--vary", "coating.specularity=0.2:0.3:2", "-b",
+                 f"{mine}:near", "-b", f"{mine}:shy", "--method", "grid",
+                 "--out", study)  # fmt: skip
+    assert result.exit_code == 0, result.output
+    assert "3 trials without a value of shy:\n  3  shy: RuntimeError: I have" in result.output
+    assert "  shy failed" in result.output
+    assert "trials failed" not in result.output
+    with closing(Study.open(study)) as opened:
+        page = render_study(opened)
+    assert '<span class="soft">without a value of shy</span> <b>3</b>' in page
+    assert "Trials without a value of shy, by cause" in page
+    assert "Trial 2 is the best by near, the first objective, but another" in page
 
 
 def test_an_objective_that_always_fails(mine: Path, tmp_path: Path) -> None:

@@ -19,6 +19,7 @@ from optisense.search._run_search import run_study
 from optisense.search.methods import METHODS, Method, register
 from optisense.search.methods._pareto import Pareto
 from optisense.search.space.constraints import UserRule
+from optisense.search.study.failures import incomplete
 
 SPACE = {"coating.specularity": (0.0, 1.0, 5), "camera.position.x": (-1.0, 3.0, 3)}
 
@@ -110,6 +111,23 @@ def test_an_objective_that_always_fails_is_to_be_repaired(
         search(mini, SPACE, f"{file}:mine", budget=10)
     assert told.value.hint is not None
     assert told.value.hint.startswith("Repair the objective mine,")
+
+
+def test_the_first_objective_decides_whether_a_trial_has_failed(
+    mini: SensorDesign, goals: ModuleType
+) -> None:
+    space, both = {"coating.specularity": (0.0, 1.0, 25)}, [goals.brightness, goals.broken]
+    seen: list[SearchProgress] = []
+    result = search(mini, space, both, method="grid", progress=seen.append)
+    assert result.best.score == seen[-1].best == 1.0
+    assert seen[-1].failed == 0
+    kinds = incomplete(result.trials)
+    assert {kind: len(members) for kind, members in kinds.items()} == {
+        "without a value of broken": 26
+    }
+    assert [note for note in result.notes if "another objective failed: broken: ValueError" in note]
+    with pytest.raises(SearchError, match="trials so far have failed"):
+        search(mini, space, both, method="pareto", budget=25)  # no trial is on its front
 
 
 def test_a_rule_that_always_fails_is_to_be_repaired(mini: SensorDesign, goals: ModuleType) -> None:

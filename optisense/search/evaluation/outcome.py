@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -27,7 +27,7 @@ class Outcome:
 
     Attributes:
         scores: score by the name of each objective, higher is better; NaN where there is none.
-        failure: reason why a score is missing, or None.
+        failure: reason why a score or the value of a limited quantity is missing, or None.
         parts: components of the scores, by objective, ready for JSON; the entry `CONDITIONS` holds
             the value of the limited quantity of each condition of the search, by the condition's
             text.
@@ -45,8 +45,18 @@ class Outcome:
 
     @property
     def failed(self) -> bool:
-        """Whether a score is missing."""
+        """Whether any score, or the value of a limited quantity, is missing."""
         return self.failure is not None
+
+    def lacking(self, names: Iterable[str]) -> list[str]:
+        """Return those of these objectives that have no score."""
+        return [name for name in names if not math.isfinite(self.scores.get(name, math.nan))]
+
+    @property
+    def unmeasured(self) -> list[str]:
+        """Objectives without a score, and conditions whose limited quantity has no value."""
+        limits = [text for text, value in self.conditions.items() if value is None]
+        return [*self.lacking(self.scores), *limits]
 
     @property
     def conditions(self) -> Mapping[str, float | None]:
@@ -71,7 +81,6 @@ class Outcome:
 
 def rank_of(outcome: Outcome, objective: str) -> Rank:
     """Return the rank of an outcome by one objective, by the rules in `requirements`."""
-    score = outcome.scores.get(objective, math.nan)
-    if not math.isfinite(score):
+    if outcome.lacking([objective]):
         return FAILED
-    return (0, score) if outcome.is_feasible else (-1, -outcome.violation)
+    return (0, outcome.scores[objective]) if outcome.is_feasible else (-1, -outcome.violation)

@@ -70,8 +70,7 @@ class Combinations(Method):
     def tell(self, vectors: FloatArray, outcomes: Sequence[Outcome]) -> None:
         """Store the rank of each combination of a generation (k, n); failed ones rank last."""
         for key, outcome in zip(self._asked, outcomes, strict=True):
-            rank = rank_of(outcome, self.problem.objectives[0])
-            self._known[key] = FAILED if outcome.failed else rank
+            self._known[key] = rank_of(outcome, self.problem.objectives[0])
 
     def everything(self, stage: str) -> Iterator[Stage]:
         """Yield all combinations; the last parameter changes fastest."""

@@ -128,7 +128,8 @@ class GradientEvaluator(PickledWithoutCaches):
     def __call__(self, vector: FloatArray, seed: int) -> Outcome:
         """See `Evaluator`."""
         outcome = self.usual(vector, seed)
-        if outcome.failed or seed != self.seed:
+        wanted = {self.objective, *outcome.conditions}
+        if not wanted.isdisjoint(outcome.unmeasured) or seed != self.seed:
             return outcome
         began = time.perf_counter()
         try:
@@ -143,7 +144,7 @@ class GradientEvaluator(PickledWithoutCaches):
             facts[GRADIENT_HOLDS] = found.holds
         parts[self.objective] = {**parts.get(self.objective, {}), **facts}
         seconds = outcome.seconds + time.perf_counter() - began
-        return Outcome(outcome.scores, None, parts, seconds, found.gradients.ravel())
+        return Outcome(outcome.scores, outcome.failure, parts, seconds, found.gradients.ravel())
 
     def checked_gradient(self, vector: FloatArray, seed: int) -> CheckedGradient:
         """Return the smoothed score at a point (n,), and a gradient that has been compared with the

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from optisense.errors import SearchError
 from optisense.search.evaluation.outcome import Outcome
@@ -25,48 +26,57 @@ class Tally:
     """Counts of the finished trials of a study.
 
     Attributes:
-        done, failed, broken: number of finished trials, of failed ones, and of those that break a
-            condition, each without the start.
+        done, failed, broken: number of finished trials, of those without a score, and of those with
+            one that break a condition, each without the start.
         best, start: highest score of a trial that meets all conditions, and score of the start;
             NaN if there is none.
-        scored: outcomes by the bytes of their points.
+        scored: outcomes with a score by the bytes of their points.
     """
 
-    def __init__(self, objective: str) -> None:
-        """Args: objective: name of the objective that `best` and `start` are scores of."""
+    def __init__(self, weighed: Sequence[str]) -> None:
+        """Start with no trials.
+
+        Args:
+            weighed: objectives without which a trial is of no use to the search, as without the
+                value of a condition. `best` and `start` are scores of the first one.
+        """
         self.done = self.failed = self.broken = 0
         self.best = self.start = math.nan
         self.scored: dict[bytes, Outcome] = {}
-        self._objective = objective
+        self._weighed = weighed
+        self._useless = 0
         self._nearest: Outcome | None = None
         self._leading: dict[str, tuple[int, Outcome]] = {}
         self._reasons: dict[str, list[str]] = {}
 
     def count(self, row: Row, outcome: Outcome) -> None:
         """Count a finished trial; SearchError if the first trials all failed."""
-        score = outcome.scores.get(self._objective, math.nan)
+        score = outcome.scores.get(self._weighed[0], math.nan)
+        failed = not math.isfinite(score)
         if row.generation == START:
             self.start, self._leading["start"] = score, (row.number, outcome)
         else:
             self.done += 1
-            self.failed += outcome.failed
-            self.broken += not outcome.failed and not outcome.is_feasible
-            if outcome.failure is not None:
-                self._reasons.setdefault(cause_of(outcome.failure), []).append(outcome.failure)
-        if not outcome.failed:
+            self.failed += failed
+            self.broken += not failed and not outcome.is_feasible
+            if outcome.lacking(self._weighed) or None in outcome.conditions.values():
+                self._useless += 1
+                reason = outcome.failure or "there is no score"
+                self._reasons.setdefault(cause_of(reason), []).append(reason)
+        if not failed:
             self.scored[row.vector.tobytes()] = outcome
             if outcome.is_feasible and not score <= self.best:
                 self.best, self._leading["best"] = score, (row.number, outcome)
             if self._nearest is None or outcome.violation < self._nearest.violation:
                 self._nearest = outcome
         enough = ALL_FAIL_WITH_START if math.isnan(self.start) else ALL_FAIL
-        if self.failed == self.done >= enough:
+        if self._useless == self.done >= enough:
             raise self.all_failed()
 
     @property
     def has_no_score(self) -> bool:
         """Whether there are trials, but neither they nor the start have a score."""
-        return self.done == self.failed > 0 and math.isnan(self.start)
+        return self.done == self._useless > 0 and math.isnan(self.start)
 
     def all_failed(self) -> SearchError:
         """Return the error for a study in which no trial has a score."""
@@ -81,12 +91,12 @@ class Tally:
         """Return what to do if no trial has a score."""
         start = self._leading["start"][1] if "start" in self._leading else None
         causes = [each[0] for each in self._reasons.values()]
-        if start is None or start.failure is None or not all(map(is_defect, causes)):
+        missing = [] if start is None else start.lacking(start.scores)
+        if not missing or not all(map(is_defect, causes)):
             return (
                 "Change the bounds, or see with `optisense evaluate` whether the design can be "
                 "scored at all"
             )
-        missing = [name for name, score in start.scores.items() if math.isnan(score)]
         faulty = "the rule" if is_of_rule(causes[0]) else f"the objective {', '.join(missing)}"
         return f"Repair {faulty}, which failed for every design that was tried, the start included"
 
@@ -98,7 +108,7 @@ class Tally:
 
     def leading(self) -> list[tuple[int, Outcome]]:
         """Return numbers and outcomes of the start and of the best trial, if that is better."""
-        if not self.best > self.start or self._leading["start"][1].failed:
+        if not self.best > self.start:
             return []  # one of the two is NaN if it has no score
         return [self._leading["start"], self._leading["best"]]
 

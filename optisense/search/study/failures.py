@@ -1,13 +1,24 @@
-"""Failed trials grouped by cause: the same two parts or the same rule, with any coordinates."""
+"""Trials without a score, or without another value, and the causes of that.
+
+The first objective decides: a trial with a score by it has not failed, and may be the best. Causes
+are the same for the same two parts or the same rule, with any coordinates.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from optisense.objectives.scoring import RETURNED
 from optisense.search.space.constraints import RULE
+
+if TYPE_CHECKING:
+    from optisense.search.study.trial import Trial
+
+FAILED = "failed"
+"""Kind of the trials without a score; see `incomplete`."""
 
 _PLACE = re.compile(r" at \([-+\d., e]+\)(?: mm)?")
 """Pattern of coordinates in a message, such as `` at (3.76, 11.51, 86.87) mm``."""
@@ -63,3 +74,34 @@ def by_cause(failures: Iterable[tuple[int, str]]) -> list[FailureCause]:
         text = cause_of(reason)
         found.setdefault(text, FailureCause(text, reason)).numbers.append(number)
     return sorted(found.values(), key=lambda cause: -len(cause.numbers))
+
+
+def incomplete(trials: Iterable[Trial]) -> dict[str, list[Trial]]:
+    """Return the trials for which a value is missing, by kind: first those without a score
+    (`FAILED`), then others, such as "without a value of aoap".
+    """
+    found: dict[str, list[Trial]] = {FAILED: []}
+    for trial in trials:
+        missing = trial.outcome.unmeasured
+        if trial.outcome.lacking([trial.objective]):
+            found[FAILED].append(trial)
+        elif missing:
+            found.setdefault(f"without a value of {', '.join(missing)}", []).append(trial)
+    return {kind: members for kind, members in found.items() if members}
+
+
+def causes_among(trials: Iterable[Trial]) -> list[FailureCause]:
+    """Return the causes why trials have no score or lack a value, the most frequent first."""
+    return by_cause((trial.number, trial.failure or "") for trial in trials)
+
+
+def incomplete_note(best: Trial | None) -> str | None:
+    """Return a note for the user if the best trial lacks the value of a further objective, else
+    None.
+    """
+    if best is None or best.failure is None:
+        return None
+    return (
+        f"trial {best.number} is the best by {best.objective}, the first objective, but another "
+        f"objective failed: {best.failure}"
+    )

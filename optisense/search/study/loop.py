@@ -24,6 +24,7 @@ from optisense.search.study._tally import Tally
 from optisense.search.study.advice import moved_start_note
 from optisense.search.study.best import newer_note, tie_note
 from optisense.search.study.conditions import condition_note, worsened_note
+from optisense.search.study.failures import incomplete_note
 from optisense.search.study.plan import evaluators
 from optisense.search.study.progress import (
     FRESH,
@@ -80,7 +81,8 @@ class StudyRun:
         self._make_runner = make_runner
         self._progress = progress or (lambda progress: None)
         self._notes: list[str] = []
-        self._tally = Tally(study.objective)
+        names = settings.names
+        self._tally = Tally(names if self.method.multi_objective else names[:1])
         self._watch = ReadingWatch(study, self._tally, usual, front=self.method.multi_objective)
         self._last_report = time.monotonic()
         self._stage = START_STAGE
@@ -132,6 +134,7 @@ class StudyRun:
             newer_note(trials),
             None if several else tie_note(trials),
             condition_note(trials),
+            incomplete_note(study.best),
             None if several else worsened_note(study.best, study.start),
         ]
         notes = [*study.shape_notes, *self._notes, *self.method.notes(), *filter(None, found)]

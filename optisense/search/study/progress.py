@@ -23,7 +23,7 @@ class SearchProgress:
         done: number of finished trials, including those of earlier runs, without the start. In the
             stage "fresh seeds", number of finished scores.
         total: largest number of trials; in the stage "fresh seeds", expected number of scores.
-        failed: number of finished trials that failed.
+        failed: number of finished trials without a score by the first objective.
         broken: number of finished trials that break a condition.
         nearest: conditions that the trial nearest to feasibility breaks; empty as soon as a trial
             meets them all.

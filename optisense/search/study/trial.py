@@ -58,7 +58,7 @@ class Trial:
 
     @property
     def failure(self) -> str | None:
-        """Reason why a score is missing, or None."""
+        """Reason why a score or the value of a limited quantity is missing, or None."""
         return self.outcome.failure
 
     @property
