@@ -7,13 +7,17 @@ even if it is as weak as those between the facets of a curved surface.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
 from optisense.array_types import BoolArray, FloatArray, IntArray
 from optisense.geometry.connected import connected_components
-from optisense.geometry.mesh import TriangleMesh
 from optisense.geometry.patches import inner_edges
+
+if TYPE_CHECKING:
+    from optisense.geometry.mesh import TriangleMesh
 
 FLAT = 0.003
 """Angle (degrees) between neighbouring triangles up to which they belong to one flat face: the

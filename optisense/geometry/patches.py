@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from optisense.array_types import FloatArray
 from optisense.geometry.connected import connected_components
-from optisense.geometry.mesh import TriangleMesh
+
+if TYPE_CHECKING:
+    from optisense.geometry.mesh import TriangleMesh
 
 Faces = NDArray[np.int64]
 

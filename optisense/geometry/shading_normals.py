@@ -7,12 +7,16 @@ Corner normals are averages over the faces around the vertex, weighted by the co
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
 from optisense.array_types import FloatArray
 from optisense.geometry._isolated_bends import divide_at_isolated_bends
-from optisense.geometry.mesh import TriangleMesh
+
+if TYPE_CHECKING:
+    from optisense.geometry.mesh import TriangleMesh
 
 SAME_NORMAL = 1e-6
 """Difference between the components of unit normals below which corners of a vertex share it: far
