@@ -118,5 +118,5 @@ def _read(result: Any) -> tuple[float, Mapping[str, Any], Mapping[str, Any], Any
 
 def _number(value: Any) -> float:
     if isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool):
-        return float(value)
+        return float(value) + 0.0  # zero without a sign, as tables show it
     raise ObjectiveError(f"{RETURNED} a {type(value).__name__}", hint=f"Return {RETURNS}")

@@ -253,6 +253,10 @@ def test_what_an_objective_may_return(evaluation: Evaluation, result: Any) -> No
     assert score.objective == "own"
 
 
+def test_a_score_of_zero_has_no_sign() -> None:
+    assert str(score_of(find("aoap"), lambda: -0.0).value) == "0.0"
+
+
 def test_ctrl_c_is_not_a_failure(evaluation: Evaluation) -> None:
     def stopped(evaluation: Evaluation) -> float:
         raise KeyboardInterrupt
