@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import NoReturn
 
 from optisense.cli import stopping
+from optisense.cli.console import EXIT_INTERRUPTED, messages
 
 
 def run_and_leave(command: Callable[[], object]) -> NoReturn:
@@ -27,6 +28,9 @@ def run_and_leave(command: Callable[[], object]) -> NoReturn:
         if stop.code is not None and not isinstance(stop.code, int):
             raise
         code = stopping.exit_code(stop.code or 0)
+    except KeyboardInterrupt:  # outside of a command, such as while a usage error is printed
+        messages.print("interrupted")
+        code = stopping.exit_code(EXIT_INTERRUPTED)
     stopping.finish(code)
     for each in threading.enumerate():  # as Python waits for them at its end
         if not each.daemon and each is not threading.main_thread():

@@ -81,6 +81,21 @@ run_and_leave(command)
 """
 
 
+OUTSIDE = """
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from optisense import starting
+from optisense.cli import stopping
+from optisense.cli.leaving import run_and_leave
+def command():
+    signal.raise_signal({number})
+    for _ in range(9): pass
+stopping.install_handlers()
+starting.begin()
+run_and_leave(command)
+"""
+
+
 @contextmanager
 def ready(program: str) -> Iterator[subprocess.Popen[str]]:
     """A child that has come as far as it says."""
@@ -203,6 +218,14 @@ def test_ctrl_c_in_code_that_is_executed_gives_the_usual_code() -> None:
     child = ended(EXECUTING)
     assert child.stderr == "interrupted\n"
     assert child.returncode == 130
+
+
+@SIGNALS
+def test_a_signal_while_a_usage_error_is_printed_ends_in_a_word(number: int, code: int) -> None:
+    """Typer prints these outside of the command."""
+    child = ended(OUTSIDE.format(number=number))
+    assert child.stderr == "interrupted\n"
+    assert child.returncode == code
 
 
 @SIGNALS
