@@ -103,35 +103,45 @@ def search(
         raise typer.BadParameter("name a folder for the study", param_hint="--out")
     began = time.monotonic()
 
-    with ExitStack() as stack:
-        # It may ask whether code is trusted, so it comes before the progress.
-        study = _resumed_study(out, design, options.as_stored(), trust) if resume else None
-        with search_progress(workers if cluster is None else 0) as show:
-            if study is None:
-                study = _new_study(out, design, options)
-            from optisense.search import run_study
+    is_kept = resume
+    try:
+        with ExitStack() as stack:
+            # It may ask whether code is trusted, so it comes before the progress.
+            study = _resumed_study(out, design, options.as_stored(), trust) if resume else None
+            with search_progress(workers if cluster is None else 0) as show:
+                if study is None:
+                    study = _new_study(out, design, options)
+                    is_kept = True
+                from optisense.search import run_study
 
-            stack.callback(study.close)
-            result = run_study(
-                study,
-                workers=workers if cluster is None else cluster,
-                limit=options.budget,
-                variant=variant,
-                progress=show,
-                on_wait=stopping.print_wait,
+                stack.callback(study.close)
+                result = run_study(
+                    study,
+                    workers=workers if cluster is None else cluster,
+                    limit=options.budget,
+                    variant=variant,
+                    progress=show,
+                    on_wait=stopping.print_wait,
+                )
+            best = result.study.best
+            better = best is not None and not best.is_start
+            if as_json:
+                print_json(summary(result))
+            else:
+                print_result(result, out)
+        if result.interrupted:
+            raise KeyboardInterrupt
+    except KeyboardInterrupt:
+        if is_kept:
+            messages.print(
+                "interrupted: all trials are kept; continue with optisense search --resume --out "
+                f"{argument(out)}"
             )
-        best = result.study.best
-        better = best is not None and not best.is_start
-        if as_json:
-            print_json(summary(result))
         else:
-            print_result(result, out)
-    if result.interrupted:
-        messages.print(
-            "interrupted: all trials are kept; continue with optisense search --resume --out "
-            f"{argument(out)}"
-        )
-        raise typer.Exit(EXIT_INTERRUPTED)
+            messages.print(
+                "interrupted before the first trial: no study was kept; give the same command again"
+            )
+        raise typer.Exit(EXIT_INTERRUPTED) from None
     long = time.monotonic() - began >= VERIFIED_FROM
     if better and not as_json and (long if verify is None else verify):
         _verify(out, variant)

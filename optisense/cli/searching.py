@@ -108,7 +108,9 @@ def _listed(worsened: Mapping[str, str]) -> str:
 
 def _waits(last: list[SearchProgress]) -> str:
     """Return what a first Ctrl-C waits for if trials are scored in this process."""
-    if not last or last[0].stage == "start":
+    if not last:
+        return "preparing the sensor; nothing has been scored yet"
+    if last[0].stage == "start":
         return "finishing the score of the start"
     if last[0].stage != "trials":
         return "finishing the current score"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import signal
 import subprocess
 from contextlib import closing
 from pathlib import Path
@@ -304,6 +305,21 @@ def test_ctrl_c_keeps_what_is_finished(mine: Path, tmp_path: Path) -> None:
     result = run("--resume", "--out", tmp_path / "study", "--workers", "2")
     assert result.exit_code == 0, result.output
     assert len(Study.open(tmp_path / "study").trials) == 31
+
+
+def test_ctrl_c_while_the_sensor_is_prepared_says_that_nothing_is_kept(tmp_path: Path) -> None:
+    file = tmp_path / "early.py"
+    file.write_text("import os, signal, time\nos.kill(os.getpid(), signal.SIGINT)\ntime.sleep(9)\n")
+    child = subprocess.run(
+        [programs() / "optisense", "search", "gelsight-mini-ideal", "--vary", "camera.fov=50:60",
+         "-b", f"{file}:near", "--out", str(tmp_path / "study")],
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        capture_output=True,
+        text=True,
+    )  # fmt: skip
+    assert child.returncode == 130
+    assert "no study was kept; give the same command again" in child.stderr
+    assert not (tmp_path / "study").exists()
 
 
 def test_methods_are_listed() -> None:
