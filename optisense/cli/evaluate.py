@@ -32,7 +32,7 @@ from optisense.writing import remove_own_page, write_json
 
 if TYPE_CHECKING:
     from optisense.objectives import Objective
-    from optisense.objectives.scored import Scored
+    from optisense.objectives.score import Scored
 
 JSON_FILE = "scores.json"
 REPORT_FILE = "scores.html"
@@ -97,7 +97,7 @@ def evaluate(
         if out is not None:
             take_folder(out, (JSON_FILE, *([REPORT_FILE] if report else [])), MARK)
 
-        from optisense.objectives.scored import Scored
+        from optisense.objectives.score import Scored
         from optisense.optics import OpticalModel
 
         scored = Scored(sensor)

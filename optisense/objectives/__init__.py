@@ -1,7 +1,7 @@
 """Objectives that rate a sensor: the four built-in ones, and a user's own."""
 
-from optisense.objectives._press import Press
 from optisense.objectives.evaluation import Evaluation
+from optisense.objectives.press import Press
 from optisense.objectives.registry import BUILT_IN, Objective, find, names, objective
 from optisense.objectives.run import evaluate
 from optisense.objectives.score import Score

@@ -1,5 +1,5 @@
-"""AOAP: the mean cosine between the camera's rays and the normals of the sensing surface (the
-OptiSense paper, "As-orthographic-as-possible objective function").
+"""AOAP, the mean cosine between the camera's rays and the normals of the sensing surface (the
+OptiSense paper, "As-orthographic-as-possible objective function"), and coverage, a part of it.
 """
 
 from __future__ import annotations
@@ -7,15 +7,59 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from optisense.errors import ObjectiveError
 from optisense.objectives import _figures
-from optisense.objectives._coverage import triangles_seen
 from optisense.objectives.registry import objective
 from optisense.objectives.settings import refuse_outside
 
 if TYPE_CHECKING:
     from optisense.objectives.evaluation import Evaluation
+
+
+@objective(
+    "coverage",
+    title="Coverage",
+    draw=_figures.draw_coverage,
+    beside=("by_triangles",),
+    range=(0.0, 1.0),
+    rays_only=True,
+    usual=(0.456, 0.749),  # GelBelt, GelSight360
+    numbers=(
+        "by_triangles",
+        "area",
+        "triangles_seen",
+        "triangles",
+        "pixels_that_see_the_surface",
+    ),
+)
+def coverage(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, Any]]:
+    """The share of the sensing surface that the camera sees.
+
+    The value is the area that footprints of pixels cover, divided by the area of the surface. It
+    depends neither on the mesh's triangles nor on the resolution of the rays, and a place that is
+    visible by two mirrors counts once. The part `by_triangles` is the number of triangles on which
+    a chief ray arrives, divided by the number of all, as AOAP counts them.
+    """
+    rays, share = evaluation.checked_rays, evaluation.view.skin
+    seen = triangles_seen(evaluation)
+    parts = {
+        "by_triangles": float(seen.mean()),
+        "area": share * evaluation.model.sensing.area,
+        "triangles_seen": int(seen.sum()),
+        "triangles": len(seen),
+        "pixels_that_see_the_surface": float(rays.hit.mean()),
+    }
+    return share, parts, {"hit": rays.hit}
+
+
+def triangles_seen(evaluation: Evaluation) -> NDArray[np.bool_]:
+    """Return a mask (f,) of the triangles of the sensing surface on which a chief ray arrives."""
+    rays, faces = evaluation.checked_rays, evaluation.sensing_faces
+    seen: NDArray[np.bool_] = np.bincount(rays.face[rays.hit], minlength=faces)[:faces] > 0
+    return seen
+
 
 COVERAGE_WEIGHT = 0.01
 """Weight k1 of the paper, with which coverage, reported beside the value, hardly counts."""
@@ -30,10 +74,6 @@ def bounds(*, coverage_weight: float) -> tuple[float, float]:
     return 0.0, 1.0 + coverage_weight
 
 
-USUAL = (0.24, 1.0)
-"""Values of the poorest and best built-in sensor: GelSight Svelte, spherical GelSight Mini."""
-
-
 @objective(
     "aoap",
     title="AOAP",
@@ -41,7 +81,7 @@ USUAL = (0.24, 1.0)
     beside=("coverage_by_area",),
     range=bounds,
     rays_only=True,
-    usual=USUAL,
+    usual=(0.24, 1.0),  # GelSight Svelte, spherical GelSight Mini
     numbers=(
         "coverage",
         "coverage_by_area",

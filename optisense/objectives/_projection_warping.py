@@ -46,10 +46,6 @@ class TriangleAreas(NamedTuple):
     discontinuous: int
 
 
-USUAL = (1.2, 60.0)
-"""Values of the poorest and the best built-in sensor: GelSight360, GelBelt."""
-
-
 @objective(
     "2to3pw",
     title="2to3PW",
@@ -57,7 +53,7 @@ USUAL = (1.2, 60.0)
     beside=("mean_area",),
     range=(0.0, 1.0 / MOST_EVEN),
     rays_only=True,
-    usual=USUAL,
+    usual=(1.2, 60.0),  # GelSight360, GelBelt
     numbers=(
         "mean_area",
         "standard_deviation",

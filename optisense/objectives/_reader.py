@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from optisense.array_types import FloatArray
 from optisense.errors import ObjectiveError
-from optisense.objectives._press import Press
+from optisense.objectives.press import Press
 from optisense.objectives.settings import refuse_outside
 from optisense.reading.camera_noise import MEASURED_NOISE
 from optisense.reading.lookup import (

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,24 +16,24 @@ from optisense.design.camera_checks import camera_fault
 from optisense.design.lenses.film import PictureWindow
 from optisense.design.limits import index_problems
 from optisense.design.problems import Diagnostic
-from optisense.errors import ObjectiveError
+from optisense.errors import ObjectiveError, OptiSenseError
 from optisense.geometry import Contact, Sphere
-from optisense.objectives._cached_values import CachedValues
-from optisense.objectives._exposure import exposure_for
-from optisense.objectives._press import Press
-from optisense.objectives._unexposed import (
+from optisense.objectives._exposure import (
     UnexposedPress,
     are_apart,
     box_around,
+    exposure_for,
     radiance_in,
 )
-from optisense.objectives.frames import nearest_press, press_frame
+from optisense.objectives.press import Press, nearest_press, press_frame
 from optisense.objectives.settings import ACROSS, VIEW_ACROSS, Settings
 from optisense.objectives.view import View, view_of
 from optisense.quality import SCORE_PHOTONS
 
 if TYPE_CHECKING:
     from optisense.optics import ChiefRays, OpticalModel, RenderProgress, TactileImage
+
+_T = TypeVar("_T")
 
 ProgressCallback = Callable[[float, str], None]
 """A function called with the finished fraction (0 to 1) of the work and the step's name."""
@@ -48,13 +49,13 @@ Reads = Callable[[Press], NDArray[np.float64]]
 others."""
 
 
-class Evaluation(CachedValues):
+class Evaluation:
     """One sensor, prepared for scoring by several objectives.
 
     Attributes:
         model: the sensor's optical model; it must not change during scoring.
         settings: settings of images and rays.
-        seconds: wall time of each shared step so far.
+        seconds: wall time (s) of each shared value so far, without that of nested values.
     """
 
     def __init__(
@@ -74,12 +75,37 @@ class Evaluation(CachedValues):
                 one by one. Other pixels affect the exposure only, and are rendered with few samples
                 (`registry.pixels_read`).
         """
-        super().__init__()
         self.model = model
+        self.seconds: dict[str, float] = {}
+        self._made: dict[str, Any] = {}
         self._reads = reads
         self.settings = settings or Settings()
         self._progress = progress or (lambda fraction, text: None)
         self._untouched_responses: dict[tuple[float, bool], NDArray[np.float32]] = {}
+
+    def take(self, other: Evaluation, names: Iterable[str]) -> None:
+        """Take those of the named values that another evaluation has computed."""
+        self._made |= {name: other._made[name] for name in names if name in other._made}
+
+    def shared(self, name: str, make: Callable[[], _T]) -> _T:
+        """Return a value that is computed on first use; an error is kept as well, and raised again.
+
+        Args:
+            name: name of the value, with the settings that it depends on.
+        """
+        if name not in self._made:
+            began = time.perf_counter()
+            inner = sum(self.seconds.values())
+            try:
+                self._made[name] = make()
+            except OptiSenseError as error:
+                self._made[name] = error
+            spent_inside = sum(self.seconds.values()) - inner
+            self.seconds[name] = round(time.perf_counter() - began - spent_inside, 4)
+        made = self._made[name]
+        if isinstance(made, OptiSenseError):
+            raise made
+        return cast("_T", made)
 
     @cached_property
     def design(self) -> SensorDesign:

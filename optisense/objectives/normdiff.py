@@ -13,7 +13,7 @@ from optisense.array_types import FloatArray
 from optisense.errors import ObjectiveError
 from optisense.objectives import _figures
 from optisense.objectives._colour_boxes import ranges_in_boxes
-from optisense.objectives._press import Press, azimuths, refuse_kind
+from optisense.objectives.press import Press, azimuths, refuse_kind
 from optisense.objectives.registry import objective
 from optisense.objectives.settings import refuse_outside
 
@@ -113,11 +113,6 @@ def bounds(*, theta_weight: float, phi_weight: float, **others: object) -> tuple
     return -180.0 * (theta_weight + phi_weight), 0.0
 
 
-USUAL = (-74.0, -31.6)
-"""Values of the poorest and the best built-in sensor by `optisense evaluate`: the cylindrical
-GelSight Mini, and GelBelt."""
-
-
 @objective(
     "normdiff",
     title="NormDiff",
@@ -125,7 +120,7 @@ GelSight Mini, and GelBelt."""
     beside=("theta_range", "phi_range"),
     reads=sample_shares,
     range=bounds,
-    usual=USUAL,
+    usual=(-74.0, -31.6),  # cylindrical GelSight Mini, GelBelt
     numbers=("theta_range", "phi_range"),
 )
 def normdiff(

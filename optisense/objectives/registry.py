@@ -20,28 +20,11 @@ from optisense.objectives.score import Drawing
 from optisense.registry import Registry, place_of_definition
 
 if TYPE_CHECKING:
-    from optisense.objectives._press import Press
     from optisense.objectives.evaluation import Evaluation, Reads
+    from optisense.objectives.press import Press
 
 BUILT_IN = ("rgb2normal", "normdiff", "aoap", "2to3pw")
 """The four objectives of the OptiSense paper."""
-
-FURTHER = (
-    "coverage",
-    "distortion",
-    "bend_radius",
-    "reading",
-    "depth",
-    "sharpness",
-    "uniformity",
-    "shadow",
-    "power",
-    "draft",
-    "clearance",
-    "cage_roughness",
-)
-"""Objectives of this package in addition to the paper's; each is a function of its name in a
-private module of its name."""
 
 CONDITIONS, WATCHED = "conditions", "watched"
 """Names under which the store of a study keeps the conditions of its trials and other watched
@@ -201,7 +184,18 @@ OBJECTIVES: Registry[Objective] = Registry(
         "normdiff": "optisense.objectives.normdiff:normdiff",
         "aoap": "optisense.objectives._aoap:aoap",
         "2to3pw": "optisense.objectives._projection_warping:projection_warping",
-        **{name: f"optisense.objectives._{name}:{name}" for name in FURTHER},
+        "coverage": "optisense.objectives._aoap:coverage",
+        "distortion": "optisense.objectives._footprints:distortion",
+        "bend_radius": "optisense.objectives._bent_parts:bend_radius",
+        "reading": "optisense.objectives._reading:reading",
+        "depth": "optisense.objectives._reading:depth",
+        "sharpness": "optisense.objectives._footprints:sharpness",
+        "uniformity": "optisense.objectives._lighting:uniformity",
+        "shadow": "optisense.objectives._lighting:shadow",
+        "power": "optisense.objectives._lighting:power",
+        "draft": "optisense.objectives._bent_parts:draft",
+        "clearance": "optisense.objectives._clearance:clearance",
+        "cage_roughness": "optisense.objectives._bent_parts:cage_roughness",
     },
     _check,
     _from_package,

@@ -18,8 +18,8 @@ from optisense.design.lenses.film import PictureWindow
 from optisense.design.responses import PictureChain
 from optisense.errors import ObjectiveError
 from optisense.objectives._exposure import exposure_for
-from optisense.objectives._press import Press
 from optisense.objectives.evaluation import Evaluation
+from optisense.objectives.press import Press
 
 if TYPE_CHECKING:
     from optisense.design import SensorDesign

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from optisense.array_types import FloatArray
 from optisense.errors import ObjectiveError
 from optisense.objectives import _figures
-from optisense.objectives._press import Press, refuse_kind
+from optisense.objectives.press import Press, refuse_kind
 from optisense.objectives.registry import objective
 from optisense.objectives.settings import refuse_outside
 
@@ -77,11 +77,6 @@ def on_lines(
     )
 
 
-USUAL = (0.72, 0.98)
-"""Values of the poorest and the best built-in sensor by `optisense evaluate`: the spherical ideal
-GelSight Mini, and GelSight Mini."""
-
-
 @objective(
     "rgb2normal",
     title="RGB2Normal",
@@ -89,7 +84,7 @@ GelSight Mini, and GelSight Mini."""
     beside=("worst_line",),
     reads=on_lines,
     range=(0.0, 1.0),
-    usual=USUAL,
+    usual=(0.72, 0.98),  # spherical ideal GelSight Mini, GelSight Mini
     numbers=("worst_line",),
 )
 def rgb2normal(

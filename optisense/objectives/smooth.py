@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from optisense.array_types import FloatArray
 from optisense.objectives._aoap import COVERAGE_WEIGHT
-from optisense.objectives._distortion import MOST_ANISOTROPY
+from optisense.objectives._footprints import MOST_ANISOTROPY
 from optisense.objectives._projection_warping import MOST_EVEN
 
 

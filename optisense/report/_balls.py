@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from optisense.array_types import FloatArray
 from optisense.geometry import Contact, Sphere
 from optisense.objectives import Settings
-from optisense.objectives.frames import nearest_press
+from optisense.objectives.press import nearest_press
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel, TactileImage

@@ -12,8 +12,7 @@ from optisense.design.section import along_rows
 from optisense.design.section_drawing import DrawnRay, section_svg
 from optisense.errors import OptiSenseError
 from optisense.objectives.registry import Objective
-from optisense.objectives.score import Score, shown_number
-from optisense.objectives.scored import Scored
+from optisense.objectives.score import Score, Scored, shown_number
 from optisense.report._drawing import figure_uri
 from optisense.report._files import page
 from optisense.report.camera_rays import CameraRays

@@ -18,7 +18,7 @@ from optisense.design import Provenance, SensorDesign
 from optisense.geometry import Contact, Sphere
 from optisense.geometry.objects import OBJECTS, ObjectIndenter
 from optisense.objectives import Evaluation, Objective, Score, Settings
-from optisense.objectives.scored import Scored
+from optisense.objectives.score import Scored
 from optisense.optics import OpticalModel, TactileImage
 from optisense.report import write_report
 from optisense.report.calibration import render_calibration

@@ -11,7 +11,7 @@ import pytest
 from optisense import evaluate
 from optisense.errors import ObjectiveError
 from optisense.geometry import TriangleMesh
-from optisense.objectives._bend_radius import (
+from optisense.objectives._bent_parts import (
     MOST_RADIUS,
     bend_radius,
     edge_curvatures,

@@ -14,8 +14,8 @@ import optisense as ots
 from optisense.design import set_value
 from optisense.errors import ObjectiveError
 from optisense.objectives import Evaluation, Settings, evaluate
-from optisense.objectives._sharpness import LEAST_CONTRAST, LINE_OF_BLUR, sharpness
-from optisense.objectives._uniformity import uniformity
+from optisense.objectives._footprints import LEAST_CONTRAST, LINE_OF_BLUR, sharpness
+from optisense.objectives._lighting import uniformity
 from optisense.objectives.relighting import Relighting
 from optisense.optics import OpticalModel
 

@@ -11,9 +11,8 @@ import pytest
 from optisense import load, set_value
 from optisense.errors import ObjectiveError
 from optisense.geometry import TriangleMesh
-from optisense.objectives._cage_roughness import cage_roughness, unevenness
+from optisense.objectives._bent_parts import cage_roughness, draft, draft_of, unevenness
 from optisense.objectives._clearance import clearance, distance
-from optisense.objectives._draft import draft, draft_of
 
 SHEET = TriangleMesh.grid((20.0, 10.0), (40, 20))
 

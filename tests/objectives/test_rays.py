@@ -12,9 +12,8 @@ from scipy.integrate import dblquad
 from optisense.errors import ObjectiveError
 from optisense.geometry import TriangleMesh
 from optisense.objectives import Evaluation
-from optisense.objectives._aoap import aoap
-from optisense.objectives._coverage import coverage
-from optisense.objectives._distortion import distortion, footprints
+from optisense.objectives._aoap import aoap, coverage
+from optisense.objectives._footprints import distortion, footprints
 from optisense.objectives._projection_warping import projection_warping, triangle_areas
 from optisense.objectives.view import View, view_of
 from optisense.optics.camera.projection import RayCamera

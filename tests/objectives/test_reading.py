@@ -15,10 +15,9 @@ from optisense.design import set_value
 from optisense.design.lenses.film import PictureWindow
 from optisense.errors import ObjectiveError
 from optisense.objectives import Evaluation, Press, Settings, evaluate
-from optisense.objectives._depth import depth
 from optisense.objectives._figures import draw_depth, draw_reading
 from optisense.objectives._reader import LEAST_PIXELS, grid_of, pixels_to_read
-from optisense.objectives._reading import reading
+from optisense.objectives._reading import depth, reading
 from optisense.objectives.relighting import Relighting
 from optisense.optics import OpticalModel
 

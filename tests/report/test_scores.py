@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from optisense.objectives import Evaluation, Objective, Score, Settings
-from optisense.objectives.scored import Scored
+from optisense.objectives.score import Scored
 from optisense.optics import OpticalModel
 from optisense.report.scores import render_scores
 from optisense.sensors import gelsight_mini_ideal

@@ -16,7 +16,7 @@ import numpy as np
 from optisense.design import SensorDesign
 from optisense.errors import OptiSenseError, SetupError
 from optisense.objectives import Evaluation, Settings
-from optisense.objectives.frames import press_frame
+from optisense.objectives.press import press_frame
 from optisense.objectives.run import split_settings
 from optisense.objectives.settings import ACROSS
 from optisense.quality import PHOTONS, SCORE_PHOTONS, photons_of

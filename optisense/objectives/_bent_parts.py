@@ -1,4 +1,4 @@
-"""Bend radius: the smallest radius to which cages bend the parts of a sensor, which determines how
+"""Objectives of parts that cages bend: bend radius, draft and cage roughness, which determine how
 they can be made.
 
 A sheet breaks or springs back when it is bent too sharply, and a film cannot be laid over a shape
@@ -10,6 +10,7 @@ radius.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from optisense.errors import ObjectiveError
 from optisense.geometry import TriangleMesh
+from optisense.geometry.cage import Resolution
 from optisense.geometry.patches import inner_edges
 from optisense.objectives.registry import objective
 
@@ -111,3 +113,87 @@ def _angles(mesh: TriangleMesh, pairs: NDArray[np.int64]) -> NDArray[np.float64]
     sine = np.linalg.norm(np.cross(one, other), axis=1)
     cosine = np.einsum("ei,ei->e", one, other)
     return np.asarray(np.arctan2(sine, cosine))
+
+
+@objective(
+    "draft",
+    title="Draft",
+    range=(-90.0, 90.0),
+    unit="degrees",
+    rays_only=True,
+    numbers=(),
+)
+def draft(evaluation: Evaluation) -> tuple[float, dict[str, Any]]:
+    """The smallest draft angle of the sheets that cages bend, in degrees.
+
+    A sheet is pulled off its mould along the mean of its normals, by area. The draft of a place is
+    the angle between the surface there and this direction: 90 where the mould is flat, 0 where its
+    wall is parallel to the direction, and negative in an undercut, where the sheet cannot be
+    removed. Castings usually need 1 to 3 degrees. One hundredth of a sheet's area may be steeper,
+    as in `bend_radius`. Closed bodies are left out; a gel is formed by the skin on it.
+    """
+    design = evaluation.design
+    bent = design.deformed_meshes()
+    names = dict.fromkeys(part for cage in design.cages.values() for part in cage.parts)
+    found = {name: draft_of(bent[name]) for name in names if not bent[name].is_closed}
+    if not found:
+        raise ObjectiveError(
+            "no cage bends a sheet of the design", hint="Make a cage with optisense cage"
+        )
+    return min(found.values()), {"of_parts": found}
+
+
+def draft_of(mesh: TriangleMesh) -> float:
+    """Return the draft angle (degrees) that all but `SHARE` of a sheet's area exceed."""
+    normals, areas = mesh.face_normals, mesh.face_areas
+    pull: NDArray[np.float64] = (normals * areas[:, None]).sum(axis=0)
+    length = float(np.linalg.norm(pull))
+    if length <= 0.0:  # a closed ring: half of it is undercut for any direction of removal
+        return -90.0
+    angles = np.degrees(np.arcsin(np.clip(normals @ pull / length, -1.0, 1.0)))
+    return mostly_above(angles, areas)
+
+
+@objective(
+    "cage_roughness",
+    title="Cage roughness",
+    range=(0.0, math.inf),
+    unit="mm",
+    lower_is_better=True,
+    rays_only=True,
+    numbers=("largest",),
+)
+def cage_roughness(evaluation: Evaluation) -> tuple[float, dict[str, Any]]:
+    """The unevenness of the displacements of the control points of cages, in mm.
+
+    It is the root mean square, over all points with two neighbours along an axis of the lattice, of
+    the difference between a point's displacement and the mean displacement of these neighbours. It
+    is 0 if the lattice is moved, stretched or sheared as a whole, which bends nothing. The value is
+    that of the roughest cage; `largest` is the largest such difference.
+    """
+    found, largest = {}, 0.0
+    for name, cage in evaluation.design.cages.items():
+        moved = cage.offsets_at_rest()
+        uneven = unevenness(moved, cage.resolution)
+        found[name] = float(np.sqrt((uneven**2).mean())) if len(uneven) else 0.0
+        largest = max(largest, float(uneven.max(initial=0.0)))
+    if not found:
+        raise ObjectiveError("the design has no cage", hint="Make a cage with optisense cage")
+    return max(found.values()), {"of_cages": found, "largest": largest}
+
+
+def unevenness(moved: NDArray[np.float64], resolution: Resolution) -> NDArray[np.float64]:
+    """Return the distance (k,), mm, between the displacement of each control point and the mean
+    displacement of its neighbours.
+
+    Args:
+        moved: (nx * ny * nz, 3) displacement of each point, mm.
+        resolution: number of points along x, y and z.
+    """
+    ways = moved.reshape(*resolution, 3)
+    found = [
+        0.5 * np.linalg.norm(np.diff(ways, 2, axis=axis), axis=-1).ravel()
+        for axis in range(3)
+        if resolution[axis] > 2
+    ]
+    return np.concatenate(found) if found else np.zeros(0)

@@ -1,7 +1,8 @@
-"""Shadow: the share of the skin around a pressed ball that loses a colour."""
+"""Objectives of the light on the skin: uniformity, shadow and power."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +10,6 @@ import numpy as np
 
 from optisense.errors import ObjectiveError
 from optisense.objectives import _figures
-from optisense.objectives._uniformity import COLOURS, UNLIT
 from optisense.objectives.registry import no_pixels, objective
 from optisense.quality import SCORE_PHOTONS
 
@@ -17,6 +17,48 @@ if TYPE_CHECKING:
     from optisense.geometry import Contact
     from optisense.objectives.evaluation import Evaluation
     from optisense.optics import TactileImage
+
+DIM, BRIGHT = 5.0, 95.0
+"""Percentiles of the light in the pixels that see the skin that define its dim and bright parts.
+The extremes would be single pixels beside a light or in a corner."""
+
+UNLIT = 0.01
+"""Share of the brightest colour's level below which a colour counts as unlit: a few levels of 255,
+little more than the camera's noise.
+"""
+
+COLOURS = ("red", "green", "blue")
+
+
+@objective(
+    "uniformity",
+    title="Uniformity",
+    beside=COLOURS,
+    reads=no_pixels,
+    range=(0.0, 1.0),
+    numbers=COLOURS,
+)
+def uniformity(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, Any]]:
+    """The evenness of the light on the untouched skin: dim over bright, for the least even colour.
+
+    The value is the ratio of the 5th to the 95th percentile of the linear light in the pixels that
+    see the skin, the smallest over those of red, green and blue that are lit; 1 is even.
+    """
+    evaluation.view.refuse_less(evaluation.settings)
+    image = evaluation.untouched
+    light = image.radiance[np.linalg.norm(image.normals, axis=2) > 0.5].astype(np.float64)
+    dim, bright = np.percentile(light, (DIM, BRIGHT), axis=0)
+    lit = bright > UNLIT * bright.max()
+    if not lit.any():
+        raise ObjectiveError("no light arrives on the skin", hint="Check the lights")
+    ratios = {
+        name: float(low / high)
+        for name, low, high, some in zip(COLOURS, dim, bright, lit, strict=True)
+        if some
+    }
+    least = min(ratios, key=lambda name: ratios[name])
+    return ratios[least], {**ratios, "least_even": least}, {}
+
 
 LOST = 0.25
 """Share of a colour's light from which on its loss counts: a quarter, which a reader can detect,
@@ -84,3 +126,27 @@ def _image(evaluation: Evaluation, contacts: Sequence[Contact]) -> TactileImage:
         partial=False,
         skin=settings.skin,
     )
+
+
+@objective(
+    "power",
+    title="Power",
+    range=(0.0, math.inf),
+    unit="mW",
+    lower_is_better=True,
+    rays_only=True,
+    usual=(66.0, 4.5),  # GelSight360, DIGIT
+    numbers=("lights",),
+)
+def power(evaluation: Evaluation) -> tuple[float, dict[str, Any]]:
+    """The radiant flux, in mW, of all LEDs of the sensor.
+
+    The electrical power is the radiant flux over the LEDs' efficiency.
+    """
+    lights = evaluation.design.lights
+    groups = {name: group.flux * len(group.lights) for name, group in lights.items()}
+    parts = {
+        "groups": groups,
+        "lights": sum(len(group.lights) for group in lights.values()),
+    }
+    return float(sum(groups.values())), parts

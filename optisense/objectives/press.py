@@ -1,19 +1,20 @@
-"""One press of a ball: the ground truth and the camera's response of each pixel that sees it."""
+"""One press of a ball: its frame, and the truth and the camera's response in each pixel."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from optisense.array_types import FloatArray
 from optisense.design.lenses.film import PictureWindow
 from optisense.design.responses import PictureChain
 from optisense.errors import ObjectiveError
+from optisense.geometry import Contact, SensingSurface, Sphere, locate
 
 Value = TypeVar("Value")
 
@@ -203,3 +204,41 @@ def azimuths(press: Press, normals: NDArray[np.floating]) -> tuple[FloatArray, F
     n = np.asarray(normals, dtype=np.float64)
     x, y, z = n @ press.east, n @ press.north, n @ press.inward
     return np.degrees(np.arctan2(np.hypot(x, y), z)), np.degrees(np.arctan2(y, x))
+
+
+class PressFrame(NamedTuple):
+    """Frame of a press: place (3,), mm, on the untouched surface, inward normal (3,), compass
+    directions (3,), and the ball's centre (3,), mm.
+    """
+
+    place: NDArray[np.float64]
+    inward: NDArray[np.float64]
+    east: NDArray[np.float64]
+    north: NDArray[np.float64]
+    centre: NDArray[np.float64]
+
+
+def press_frame(contact: Contact, surface: SensingSurface) -> PressFrame:
+    """Return the frame of a press of a ball."""
+    assert isinstance(contact.indenter, Sphere)
+    spot = locate(contact, surface)
+    east, _ = surface.tangents(spot.inward)
+    return PressFrame(
+        place=spot.point,
+        inward=spot.inward,
+        east=east,
+        north=np.cross(spot.inward, east),
+        centre=spot.point + (contact.depth - contact.indenter.radius) * spot.inward,
+    )
+
+
+def nearest_press(
+    points: NDArray[np.float32], mask: NDArray[np.bool_], centres: ArrayLike
+) -> NDArray[np.int64]:
+    """Return the number (h, w) of the press whose centre (of n, (n, 3) mm) is nearest to the point
+    that a pixel of the mask sees; -1 elsewhere.
+    """
+    owner = np.full(mask.shape, -1, dtype=np.int64)
+    seen = points[mask].astype(np.float64)
+    owner[mask] = np.linalg.norm(seen[:, None] - np.asarray(centres), axis=2).argmin(axis=1)
+    return owner

@@ -1,4 +1,4 @@
-"""Distortion: the ratio of length to width of a pixel's footprint on the sensing surface.
+"""Distortion and sharpness: the shapes and sizes of the pixels' footprints on the sensing surface.
 
 The chief rays of neighbouring pixels meet the surface at points P. The derivatives of P along a row
 and along a column span the footprint of a pixel, which is a parallelogram. The singular values of
@@ -10,11 +10,13 @@ texture mapping (Sander et al., "Texture mapping progressive meshes", 2001) and 
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.design.lenses.film import PictureWindow
 from optisense.errors import ObjectiveError
 from optisense.objectives import _figures
 from optisense.objectives._pixel_edges import pixel_edges
@@ -35,10 +37,6 @@ HIGH_SHARE = 95.0
 """Percentile of the anisotropy reported beside its mean: one footprint in twenty is longer."""
 
 
-USUAL = (1.24, 1.01)
-"""Values of the poorest and the best built-in sensor: GelSight360, GelBelt."""
-
-
 @objective(
     "distortion",
     title="Distortion",
@@ -47,7 +45,7 @@ USUAL = (1.24, 1.01)
     range=(1.0, MOST_ANISOTROPY),
     lower_is_better=True,
     rays_only=True,
-    usual=USUAL,
+    usual=(1.24, 1.01),  # GelSight360, GelBelt
     numbers=(
         "area_variation",
         "of_one_pixel_in_20",
@@ -139,3 +137,57 @@ def _product(u: list[NDArray[np.float32]], v: list[NDArray[np.float32]]) -> NDAr
     """Return the dot products (h, w) of vectors given as x, y and z."""
     product: NDArray[np.float32] = u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
     return product
+
+
+LEAST_CONTRAST = 0.1
+"""Smallest contrast, relative to that of coarse lines, at which fine lines are resolved: the usual
+10 per cent of a lens's modulation transfer function."""
+
+LINE_OF_BLUR = math.pi / math.sqrt(2.0 * math.log(1.0 / LEAST_CONTRAST))
+"""Width of the finest line, in standard deviations of a Gaussian blur: lines of width w keep
+exp(-(pi s / w)^2 / 2) of their contrast (the Gaussian's Fourier transform at the period 2 w)."""
+
+
+@objective(
+    "sharpness",
+    title="Sharpness",
+    draw=_figures.draw_sharpness,
+    beside=("pixel", "blur"),
+    range=(0.0, math.inf),
+    unit="mm",
+    lower_is_better=True,
+    rays_only=True,
+    usual=(0.27, 0.059),  # GelSight360, ideal GelSight Mini
+    numbers=("pixel", "blur", "finest", "coarsest", "footprints"),
+)
+def sharpness(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, Any]]:
+    """The width in mm of the finest lines on the skin that the camera resolves.
+
+    The squared width is the sum of two squares: the longer side of the footprint of the camera's
+    pixel, and the line width at which the lens's blur leaves a tenth of the contrast. The value is
+    the mean over the skin that is seen.
+    """
+    rays = evaluation.checked_rays
+    long, wide = seen_footprints(rays)
+    known = np.isfinite(long)
+    across = rays.hit.shape[1]
+    pixel = long.astype(np.float64) * across / evaluation.design.camera.resolution[0]
+    focus = evaluation.model.picture_chain.focus
+    if focus is None:
+        blur = np.zeros_like(pixel)
+    else:
+        blur = focus.in_pixels(PictureWindow.whole(*rays.hit.shape))[:-1, :-1] * long
+    detail = np.hypot(pixel, LINE_OF_BLUR * blur)
+    area = (long * wide)[known].astype(np.float64)
+
+    def mean(values: Any) -> float:
+        return float(np.average(values[known], weights=area))
+
+    parts = {
+        "pixel": mean(pixel),
+        "blur": mean(blur),
+        "finest": float(np.percentile(detail[known], 5.0)),
+        "coarsest": float(np.percentile(detail[known], 95.0)),
+        "footprints": int(np.count_nonzero(known)),
+    }
+    return mean(detail), parts, {"detail": detail}
