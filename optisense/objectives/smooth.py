@@ -10,7 +10,7 @@ number for each mm² over what is seen.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,53 +20,13 @@ from optisense.objectives._aoap import COVERAGE_WEIGHT
 from optisense.objectives._footprints import MOST_ANISOTROPY
 from optisense.objectives._projection_warping import MOST_EVEN
 
-
-class Rays(Protocol):
-    """Chief rays of a picture.
-
-    Attributes:
-        codes: (h, w) path codes: 0 where no ray arrives; neighbours of equal code go the same way.
-        cosine: (k,) cosine of the angle between ray and normal for the k arriving rays, by row.
-        weight: (k,) area of the picture that each ray stands for, pixels.
-        points: (k, 3) end points, mm.
-        density: (k,) share of the surface's triangles per area (1/mm²) at each end point.
-        surface_area: area of the surface, mm².
-    """
-
-    @property
-    def codes(self) -> NDArray[np.uint32]:
-        """Path codes (h, w)."""
-        ...
-
-    @property
-    def cosine(self) -> FloatArray:
-        """Cosines (k,) of incidence."""
-        ...
-
-    @property
-    def weight(self) -> FloatArray:
-        """Areas (k,), pixels."""
-        ...
-
-    @property
-    def points(self) -> FloatArray:
-        """End points (k, 3), mm."""
-        ...
-
-    @property
-    def density(self) -> FloatArray:
-        """Triangles per area (k,), 1/mm²."""
-        ...
-
-    @property
-    def surface_area(self) -> float:
-        """Area of the surface, mm²."""
-        ...
+if TYPE_CHECKING:
+    from optisense.optics.transport.ray_gradient import DifferentiableRays
 
 
 class Slopes(NamedTuple):
-    """A smoothed score, and its derivatives with respect to the attributes of `Rays`; None for
-    those that it does not depend on.
+    """A smoothed score, and its derivatives with respect to attributes of the rays; None for those
+    that it does not depend on.
     """
 
     value: float
@@ -75,7 +35,7 @@ class Slopes(NamedTuple):
     points: FloatArray | None
 
 
-def smooth_aoap(rays: Rays, *, coverage_weight: float = COVERAGE_WEIGHT) -> Slopes:
+def smooth_aoap(rays: DifferentiableRays, *, coverage_weight: float = COVERAGE_WEIGHT) -> Slopes:
     """Return the mean over all pixels of weight times cosine between ray and normal, plus k1 times
     the share of the surface's triangles that are seen.
     """
@@ -87,12 +47,12 @@ def smooth_aoap(rays: Rays, *, coverage_weight: float = COVERAGE_WEIGHT) -> Slop
     return Slopes(value, rays.weight / count, by_weight, coverage_weight * seen.points)
 
 
-def smooth_coverage(rays: Rays) -> Slopes:
+def smooth_coverage(rays: DifferentiableRays) -> Slopes:
     """Return the seen share of the surface's area."""
     return _density_in_view(rays, np.full(len(rays.points), 1.0 / rays.surface_area))
 
 
-def _density_in_view(rays: Rays, at_points: FloatArray) -> Slopes:
+def _density_in_view(rays: DifferentiableRays, at_points: FloatArray) -> Slopes:
     """Return the integral over the area in view of a density (k,), 1/mm², at the end points."""
     triangles = _PixelTriangles(rays)
     density = triangles.mean_of_corners(at_points)
@@ -103,7 +63,7 @@ def _density_in_view(rays: Rays, at_points: FloatArray) -> Slopes:
     return Slopes(value, None, triangles.by_weight(density * triangles.area), by_points)
 
 
-def smooth_projection_warping(rays: Rays) -> Slopes:
+def smooth_projection_warping(rays: DifferentiableRays) -> Slopes:
     """Return weighted mean over weighted deviation of the areas between neighbouring points."""
     triangles = _PixelTriangles(rays)
     area, weight = triangles.area, triangles.weight
@@ -122,7 +82,7 @@ def smooth_projection_warping(rays: Rays) -> Slopes:
     return Slopes(mean / spread, None, slopes, triangles.by_points(by_area))
 
 
-def smooth_distortion(rays: Rays) -> Slopes:
+def smooth_distortion(rays: DifferentiableRays) -> Slopes:
     """Return the weighted geometric mean of the anisotropies of footprints of four neighbours."""
     corners = _quads(rays.codes)
     if not len(corners):
@@ -184,7 +144,7 @@ class _PixelTriangles:
             the corner's ray and m the number of triangles that it belongs to.
     """
 
-    def __init__(self, rays: Rays) -> None:
+    def __init__(self, rays: DifferentiableRays) -> None:
         self._rays = rays
         self._corners = corners = _same_way(rays.codes)
         self._places = tuple(rays.points[corners[:, k]] for k in range(3))
@@ -229,27 +189,31 @@ class _PixelTriangles:
 
 def _quads(codes: NDArray[np.uint32]) -> NDArray[np.int64]:
     """Return the numbers (q, 4) of arriving rays in quads of neighbours with the same path."""
-    number = np.cumsum(codes.ravel() > 0).reshape(codes.shape) - 1
-    before, after = slice(None, -1), slice(1, None)
-    corners = [(before, before), (before, after), (after, before), (after, after)]
-    first = codes[:-1, :-1]
-    same = (first > 0) & np.logical_and.reduce([first == codes[each] for each in corners])
-    return np.stack([number[each][same] for each in corners], axis=1).astype(np.int64)
+    corners, ways = _corners(codes)
+    same = (ways[0] > 0) & (ways == ways[0]).all(axis=0)
+    return corners[:, same].T
 
 
 def _same_way(codes: NDArray[np.uint32]) -> NDArray[np.int64]:
     """Return the numbers (t, 3) of arriving rays in triangles of neighbours with the same path."""
-    hit = codes > 0
-    number = np.full(codes.shape, -1, dtype=np.int64)
-    number[hit] = np.arange(int(hit.sum()))
+    corners, ways = _corners(codes)
+    found = []
+    for half in ([0, 1, 2], [3, 2, 1]):
+        same = (ways[half[0]] > 0) & (ways[half] == ways[half[0]]).all(axis=0)
+        found.append(corners[half][:, same].T)
+    return np.concatenate(found)
 
-    def corners(values: NDArray[np.generic]) -> list[NDArray[np.generic]]:
-        here, right = values[:-1, :-1], values[:-1, 1:]
-        below, across = values[1:, :-1], values[1:, 1:]
-        halves = np.stack([here, right, below]), np.stack([across, below, right])
-        return [half.reshape(3, -1).T for half in halves]
 
-    rays = np.concatenate(corners(number))
-    ways = np.concatenate(corners(codes))
-    same = (ways[:, 0] > 0) & (ways[:, 0] == ways[:, 1]) & (ways[:, 0] == ways[:, 2])
-    return rays[same].astype(np.int64)
+def _corners(codes: NDArray[np.uint32]) -> tuple[NDArray[np.int64], NDArray[np.uint32]]:
+    """Return the numbers (4, n) of arriving rays at the corners of all quads of pixels (upper left,
+    upper right, lower left, lower right), and the codes (4, n) of their paths.
+    """
+    number = np.cumsum(codes.ravel() > 0, dtype=np.int64).reshape(codes.shape) - 1
+    rows, columns = codes.shape
+    boxes = [
+        (slice(down, rows - 1 + down), slice(right, columns - 1 + right))
+        for down in (0, 1)
+        for right in (0, 1)
+    ]
+    numbers = np.stack([number[box].ravel() for box in boxes])
+    return numbers, np.stack([codes[box].ravel() for box in boxes])

@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from inspect import signature
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from optisense.errors import ObjectiveError
 from optisense.objectives.expressions import Expression, ScoreTerm
-from optisense.objectives.smooth import SMOOTH, Rays, Slopes
+from optisense.objectives.smooth import SMOOTH, Slopes
+
+if TYPE_CHECKING:
+    from optisense.optics.transport.ray_gradient import DifferentiableRays
 
 STEP = 1e-6
 """Step of central differences of arithmetic, absolute or, for values above 1, relative; it is near
@@ -35,7 +38,7 @@ class SmoothScore:
         smooth = all(each.objective in SMOOTH and not each.part for each in expression.quantities)
         return SmoothScore(expression) if smooth else None
 
-    def slopes(self, rays: Rays, settings: Mapping[str, Any]) -> Slopes:
+    def slopes(self, rays: DifferentiableRays, settings: Mapping[str, Any]) -> Slopes:
         """Return the value for some rays, and its derivatives by their points and directions.
         Settings that a smooth form lacks are ignored.
         """
