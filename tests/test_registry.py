@@ -17,7 +17,7 @@ import optisense.design.lenses  # noqa: F401  defines further kinds
 from optisense import sensors
 from optisense.design.kinds import KindModel
 from optisense.engine.failures import as_data
-from optisense.engine.listing import listed
+from optisense.engine.requests import listed
 from optisense.errors import ContactError, DesignError, SearchError
 from optisense.geometry import IndenterKind, Sphere, TriangleMesh, quantity, register_indenter
 from optisense.geometry.indenter_kinds import INDENTERS, indenter_from_plain

@@ -23,13 +23,11 @@ from optisense.design.parts import TRANSPARENT_SOLIDS
 from optisense.design.storage import digest_of
 from optisense.engine.designs import AnyMesh
 from optisense.engine.failures import ProtocolError, problem_row
-from optisense.engine.files import Files
 from optisense.engine.jobs import Job
-from optisense.engine.listing import listed
 from optisense.engine.protocol import Fields
 from optisense.engine.rendering import DesignFields, blender_pixels, design_of
-from optisense.engine.requests import Lane, handles
-from optisense.engine.session import Session
+from optisense.engine.requests import Lane, handles, listed
+from optisense.engine.session import Files, Session
 from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh, cage_weights
 from optisense.library import with_own_lights

@@ -22,12 +22,8 @@ class Calibrate(DesignFields, CalibrateOptions):
     to: str
 
 
-class NoFields(Fields):
-    """Fields of the request "calibration_families"; see docs/engine.md."""
-
-
-@handles("calibration_families", NoFields, Lane.QUICK)
-def calibration_families(session: Session, fields: NoFields, job: Job) -> dict[str, Any]:
+@handles("calibration_families", Fields, Lane.QUICK)
+def calibration_families(session: Session, fields: Fields, job: Job) -> dict[str, Any]:
     """Return the families of parameters that a calibration fits by default, then the others."""
     names = [*USUAL, *(name for name in FAMILIES if name not in USUAL)]
     return {

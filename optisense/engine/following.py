@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from optisense.engine.failures import Cancelled
-from optisense.engine.files import Files
 from optisense.engine.jobs import Job
 from optisense.engine.search_process import SearchProcess, is_running
+from optisense.engine.session import Files
 from optisense.time_left import TimeLeft
 
 if TYPE_CHECKING:

@@ -1,12 +1,11 @@
-"""Requests in progress, and the queues in which requests wait."""
+"""Requests in progress."""
 
 from __future__ import annotations
 
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol
+from typing import Any
 
 from optisense.design import SensorDesign
 from optisense.engine.failures import Cancelled
@@ -142,71 +141,3 @@ class Job:
     def cancelled(self) -> bool:
         """True if the request was cancelled."""
         return self._cancelled.is_set()
-
-
-class Task(Protocol):
-    """Job with its work, ready to run."""
-
-    @property
-    def job(self) -> Job:
-        """Job of the task."""
-
-    def run(self) -> None:
-        """Do the work and send the answer; raises nothing."""
-
-    def give_up(self, kind: str) -> None:
-        """Send the answer without having done the work: "Cancelled" or "Replaced"."""
-
-
-class JobQueue:
-    """Queue of requests that are carried out one after another, in a thread of its own.
-
-    A draft waits in a separate place, which holds only the newest one, and other requests go first.
-    """
-
-    def __init__(self, name: str) -> None:
-        """Start the thread."""
-        self._waiting: deque[Task] = deque()
-        self._draft: Task | None = None
-        self._changed = threading.Condition()
-        threading.Thread(target=self._work, name=name, daemon=True).start()
-
-    def put(self, task: Task) -> None:
-        """Queue a task."""
-        replaced: Task | None = None
-        with self._changed:
-            if task.job.draft:
-                replaced, self._draft = self._draft, task
-            else:
-                self._waiting.append(task)
-            self._changed.notify()
-        if replaced is not None:
-            replaced.give_up("Replaced")
-
-    def drop(self, job: Job) -> bool:
-        """Remove a task that still waits, and answer it; False if it has begun."""
-        found: Task | None = None
-        with self._changed:
-            if self._draft is not None and self._draft.job is job:
-                found, self._draft = self._draft, None
-            for task in list(self._waiting):
-                if task.job is job:
-                    found = task
-                    self._waiting.remove(task)
-        if found is not None:
-            found.give_up("Cancelled")
-        return found is not None
-
-    def _work(self) -> None:
-        while True:
-            self._next().run()
-
-    def _next(self) -> Task:
-        with self._changed:
-            while not self._waiting and self._draft is None:
-                self._changed.wait()
-            if self._waiting:
-                return self._waiting.popleft()
-            task, self._draft = self._draft, None
-            assert task is not None
-            return task

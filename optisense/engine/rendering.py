@@ -21,11 +21,10 @@ from optisense.engine.contacts import (
 )
 from optisense.engine.designs import AnyDesign, AnyMesh
 from optisense.engine.failures import ProtocolError
-from optisense.engine.files import Files
 from optisense.engine.jobs import Job
 from optisense.engine.protocol import Fields
 from optisense.engine.requests import Lane, handles
-from optisense.engine.session import KeptImage, Session, name_of
+from optisense.engine.session import Files, KeptImage, Session, name_of
 from optisense.errors import RenderError
 from optisense.near import suggestion
 from optisense.quality import MOST_PIXELS

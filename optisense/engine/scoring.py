@@ -11,13 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import Field
 
-from optisense.engine.files import Files
 from optisense.engine.jobs import Job
-from optisense.engine.listing import listed
 from optisense.engine.protocol import Fields
 from optisense.engine.rendering import DesignFields, design_of
-from optisense.engine.requests import Lane, handles
-from optisense.engine.session import Session
+from optisense.engine.requests import Lane, handles, listed
+from optisense.engine.session import Files, Session
 
 if TYPE_CHECKING:
     from optisense.objectives import Objective, Score

@@ -20,8 +20,8 @@ import traceback
 from pathlib import Path
 from typing import Any
 
-from optisense.engine.channel import Channel
 from optisense.engine.failures import as_data
+from optisense.engine.protocol import Channel
 from optisense.engine.search_process import PROCESS_FILE
 from optisense.errors import OptiSenseError
 

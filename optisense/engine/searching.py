@@ -13,10 +13,9 @@ from optisense.engine.designing import bent_shapes
 from optisense.engine.failures import ProtocolError
 from optisense.engine.following import Following, curve_row, trial_row
 from optisense.engine.jobs import Job
-from optisense.engine.listing import listed
 from optisense.engine.protocol import Fields
 from optisense.engine.rendering import DesignFields, design_of
-from optisense.engine.requests import Lane, handles
+from optisense.engine.requests import Lane, handles, listed
 from optisense.engine.scoring import own_objectives
 from optisense.engine.search_process import SearchProcess, is_running, stop_other
 from optisense.engine.session import Session

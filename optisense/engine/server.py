@@ -8,18 +8,19 @@ import sys
 import threading
 import time
 import traceback
+from collections import deque
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import IO, Any, NoReturn
 
 from optisense import __version__
 from optisense.engine import requests
-from optisense.engine.channel import Channel
 from optisense.engine.failures import Cancelled, ProtocolError, as_data
-from optisense.engine.jobs import Job, JobQueue
+from optisense.engine.jobs import Job
 from optisense.engine.protocol import (
     MOST_OF_A_LINE,
     PROTOCOL,
+    Channel,
     Fields,
     Request,
     RequestId,
@@ -64,7 +65,7 @@ class Engine:
         """Start the queues; nothing is loaded yet."""
         self.session = Session()
         self._channel = channel
-        self._lines = {lane: JobQueue(lane.value) for lane in (Lane.QUICK, Lane.RENDER)}
+        self._lines = {lane: _Queue(lane.value) for lane in (Lane.QUICK, Lane.RENDER)}
         self._open: dict[RequestId, Job] = {}
         self._changed = threading.Condition()
         self._ending = False
@@ -221,7 +222,7 @@ class Engine:
 
 
 class _Work:
-    """Request with all that it needs to run; see `optisense.engine.jobs.Task`."""
+    """Request with all that it needs to run."""
 
     def __init__(self, engine: Engine, kind: Kind, fields: Fields, job: Job) -> None:
         self._engine = engine
@@ -262,6 +263,60 @@ class _Work:
         if self._short:
             self._engine.session.priority_gate.__exit__()
         self._engine.answered(self.job, message)
+
+
+class _Queue:
+    """Queue of requests that are carried out one after another, in a thread of its own.
+
+    A draft waits in a separate place, which holds only the newest one, and other requests go first.
+    """
+
+    def __init__(self, name: str) -> None:
+        """Start the thread."""
+        self._waiting: deque[_Work] = deque()
+        self._draft: _Work | None = None
+        self._changed = threading.Condition()
+        threading.Thread(target=self._work, name=name, daemon=True).start()
+
+    def put(self, task: _Work) -> None:
+        """Queue a task."""
+        replaced: _Work | None = None
+        with self._changed:
+            if task.job.draft:
+                replaced, self._draft = self._draft, task
+            else:
+                self._waiting.append(task)
+            self._changed.notify()
+        if replaced is not None:
+            replaced.give_up("Replaced")
+
+    def drop(self, job: Job) -> bool:
+        """Remove a task that still waits, and answer it; False if it has begun."""
+        found: _Work | None = None
+        with self._changed:
+            if self._draft is not None and self._draft.job is job:
+                found, self._draft = self._draft, None
+            for task in list(self._waiting):
+                if task.job is job:
+                    found = task
+                    self._waiting.remove(task)
+        if found is not None:
+            found.give_up("Cancelled")
+        return found is not None
+
+    def _work(self) -> None:
+        while True:
+            self._next().run()
+
+    def _next(self) -> _Work:
+        with self._changed:
+            while not self._waiting and self._draft is None:
+                self._changed.wait()
+            if self._waiting:
+                return self._waiting.popleft()
+            task, self._draft = self._draft, None
+            assert task is not None
+            return task
 
 
 def serve(interrupted: Callable[[], int] = lambda: 130) -> NoReturn:

@@ -69,7 +69,7 @@ def test_nothing_but_messages_reaches_standard_output() -> None:
     """`print`, C libraries and child processes cannot write to the protocol's output."""
     program = """
 import ctypes, subprocess
-from optisense.engine.channel import Channel
+from optisense.engine.protocol import Channel
 channel = Channel.of_standard_output()
 print("from Python")
 libc = ctypes.CDLL(None)
