@@ -29,7 +29,7 @@ def contacts(
     from optisense.calibration import read_photographs
     from optisense.calibration.seen_contacts import ContactFinder
     from optisense.cli.output_folder import ensure_writable
-    from optisense.report.contacts import write_contacts
+    from optisense.report.comparison import write_contacts
 
     photographs = read_photographs(photos, options.ball).scaled()
     ensure_writable(out.parent)

@@ -13,7 +13,7 @@ from optisense.design.colour import ROLE_LOOKS
 from optisense.design.projection import directions
 from optisense.errors import OptiSenseError
 from optisense.geometry import TriangleMesh
-from optisense.report._drawing import encoded
+from optisense.report._pictures import encoded
 from optisense.report.camera_rays import CameraRays
 
 CREASE = 35.0

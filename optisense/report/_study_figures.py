@@ -13,7 +13,7 @@ from optisense.array_types import FloatArray
 from optisense.design import SensorDesign
 from optisense.design.section import section
 from optisense.figures import AMBER, BLUE, GREY, PALE, RED, new_figure
-from optisense.report._drawing import legend_above
+from optisense.report._pictures import legend_above
 from optisense.search.space.parameters import Choice
 from optisense.search.study.best import start_of
 from optisense.search.study.trial import Trial

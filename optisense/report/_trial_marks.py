@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from optisense.report import _study_tables as tables
-from optisense.report._drawing import figure_uri
-from optisense.report._pictures import data_uri
+from optisense.report._pictures import data_uri, figure_uri
 from optisense.search.study.study import Study
 from optisense.search.study.trial import Trial
 from optisense.text import argument, visible

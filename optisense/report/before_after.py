@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +13,8 @@ from optisense.design import SensorDesign
 from optisense.errors import OptiSenseError, SetupError
 from optisense.objectives import Evaluation, Settings, evaluate
 from optisense.quality import PICTURE_PHOTONS
-from optisense.report._balls import Ball, find_balls, nine_balls
 from optisense.report.camera_rays import CameraRays
-
-if TYPE_CHECKING:
-    pass
+from optisense.report.trial_pictures import Ball, find_balls, nine_balls
 
 ACROSS = 320
 """Width of each of the two pictures compared, pixels: both fit side by side on a page."""

@@ -13,8 +13,8 @@ from optisense.design.section_drawing import DrawnRay, section_svg
 from optisense.errors import OptiSenseError
 from optisense.objectives.registry import Objective
 from optisense.objectives.score import Score, Scored, shown_number
-from optisense.report._drawing import figure_uri
 from optisense.report._files import page
+from optisense.report._pictures import figure_uri
 from optisense.report.camera_rays import CameraRays
 from optisense.writing import write_text
 

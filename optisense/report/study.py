@@ -18,14 +18,13 @@ from optisense.design.section_drawing import section_svg
 from optisense.errors import OptiSenseError
 from optisense.report import _study_figures as study_figures
 from optisense.report import _study_tables as tables
-from optisense.report._balls import count_in_words, marks_svg
 from optisense.report._cage_changes import CageChange, cage_changes, cage_figure
-from optisense.report._drawing import figure_uri
 from optisense.report._files import as_json, page, script
-from optisense.report._pictures import MOST_STRETCHED, data_uri, stretching_colours
+from optisense.report._pictures import MOST_STRETCHED, data_uri, figure_uri, stretching_colours
 from optisense.report._trial_marks import Marks, TrialFigure, page_data, selectable
 from optisense.report.before_after import DesignView
 from optisense.report.tolerance import shown_size
+from optisense.report.trial_pictures import count_in_words, marks_svg
 from optisense.search.methods import find
 from optisense.search.study.best import best_of, front_among, nearest, newer_note
 from optisense.search.study.conditions import condition_note, worsened_note
@@ -82,10 +81,6 @@ def render_study(
     """Return the page of `write_study_report` as text.
 
     Args:
-        study: study, finished or not.
-        views: views of the designs "before" and "after", if they were rendered.
-        pictures: pictures (h, w, 3) of some trials, by number.
-        named: the study's folder as the user names it.
         live: version of the page, if a `LiveServer` serves it: the page then refreshes itself, and
             requests the pictures of trials from the server.
     """

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from optisense.figures import AMBER, BLUE, GREY, RED, new_figure
-from optisense.report._drawing import figure_uri, legend_above
 from optisense.report._files import page
+from optisense.report._pictures import figure_uri, legend_above
 from optisense.search.space.manufacturing import unit_of
 from optisense.search.tolerance.analysis import ScoreDistribution, Tolerance
 from optisense.search.tolerance.sensitivity import Estimate
@@ -102,27 +101,22 @@ def _objective(name: str, found: ScoreDistribution) -> dict[str, Any]:
         "noise": f"{found.noise:.2g}" if found.noise > 0.0 else "",
         "deviation": f"{found.deviation:.3g}",
         "figure": figure_uri(spread_figure(name, found)),
-        "percentiles": [(key.upper(), *_cells(each)) for key, each in found.percentiles.items()],
-        "shares": _shares(found.shares),
+        "percentiles": [
+            (key.upper(), _shown(each.value, ".4g"), _interval(each))
+            for key, each in found.percentiles.items()
+        ],
+        "shares": [(source, *_share(each)) for source, each in found.shares.items()],
         "noise_share": f"{found.noise_share:.2f}" if found.noise_share > 0.0 else "",
         "caveat": found.caveat,
     }
 
 
-def _shares(shares: Mapping[str, Estimate | None]) -> list[tuple[str, str, str, str]]:
-    """Return source, share, standard error and interval."""
-    return [(source, *_share(each)) for source, each in shares.items()]
-
-
 def _share(each: Estimate | None) -> tuple[str, str, str]:
+    """Return share, standard error and interval."""
     if each is None:
         return "unknown", "", ""
     error = f"{each.error:.2f}" if math.isfinite(each.error) else ""
     return f"{each.value:.2f}", error, _interval(each, ".2f")
-
-
-def _cells(each: Estimate) -> tuple[str, str]:
-    return _shown(each.value, ".4g"), _interval(each)
 
 
 def _interval(each: Estimate, shape: str = ".4g") -> str:

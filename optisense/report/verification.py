@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from optisense.array_types import FloatArray
 from optisense.figures import AMBER, BLUE, GREY, RED, new_figure
 from optisense.geometry.objects import OBJECTS
-from optisense.report._drawing import figure_uri, legend_above
 from optisense.report._files import page
-from optisense.report._pictures import data_uri, normal_colours
+from optisense.report._pictures import data_uri, figure_uri, legend_above, normal_colours
 from optisense.tasks.paired_errors import BETTER, INCONCLUSIVE, WORSE, ErrorChange
 from optisense.tasks.press_readings import PressPictures
 from optisense.tasks.verification import Verification

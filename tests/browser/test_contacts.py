@@ -10,7 +10,7 @@ import pytest
 
 from optisense.calibration import PhotographedPress, Photographs, read_photographs, save_photographs
 from optisense.calibration.seen_contacts import SeenContact
-from optisense.report.contacts import write_contacts
+from optisense.report.comparison import write_contacts
 
 from .conftest import Open
 

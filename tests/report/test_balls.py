@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from optisense.report._balls import count_in_words, find_balls, marks_svg
+from optisense.report.trial_pictures import count_in_words, find_balls, marks_svg
 
 
 def test_each_pixel_belongs_to_the_nearest_ball_and_pieces_are_outlined() -> None:

@@ -16,9 +16,8 @@ from optisense.errors import OutputError
 from optisense.geometry import Contact, Sphere
 from optisense.optics import OpticalModel, TactileImage
 from optisense.report import write_report
-from optisense.report._page import render_page
+from optisense.report._page import contact_rows, render_page
 from optisense.report._pictures import data_uri
-from optisense.report._tables import contact_rows
 from optisense.sensors import gelsight_mini_ideal
 
 BALL = Contact(Sphere(radius=1.5), at=(0.0, 0.0), depth=0.8)

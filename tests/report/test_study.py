@@ -14,11 +14,11 @@ import optisense as ots
 from optisense.cli import app
 from optisense.design import SensorDesign
 from optisense.report import _study_figures as study_figures
-from optisense.report._balls import Ball
 from optisense.report._cage_changes import cage_changes
-from optisense.report._drawing import figure_uri
+from optisense.report._pictures import figure_uri
 from optisense.report.before_after import DesignView, RayFigures
 from optisense.report.study import render_study, write_study_report
+from optisense.report.trial_pictures import Ball
 from optisense.search import Around, CagePoints, SearchResult, Study, search
 
 EVIL = "</table><img src=x onerror=alert(1)>"
