@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, cast
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 from rich.table import Table
@@ -148,18 +148,10 @@ def move(
     ] = "points",
 ) -> None:
     """Move control points. A shape that folds or cuts into other parts is not written."""
-    from optisense.design.cage_edit import Shape, move_points
-
     if of not in ("points", "c_min", "c_max"):
         raise typer.BadParameter(f"'{of}' is none of points, c_min, c_max", param_hint="--of")
     moves = _moves(point, "--point")
-
-    def moved(sensor: SensorDesign) -> SensorDesign:
-        for which, way in moves:
-            sensor = move_points(sensor, cage, {which: way}, cast(Shape, of))
-        return sensor
-
-    _edit(design, moved, cage, out)
+    _edit(design, lambda sensor: _moved(sensor, cage, moves, of), cage, out)
 
 
 @cage_app.command("range")
@@ -203,10 +195,7 @@ def set_range(
     def ranged(sensor: SensorDesign) -> SensorDesign:
         sensor = cage_edit.set_range(sensor, cage, blend=blend)
         for end, steps in moves.items():
-            for which, way in steps:
-                sensor = cage_edit.move_points(
-                    sensor, cage, {which: way}, cast(Literal["c_min", "c_max"], end)
-                )
+            sensor = _moved(sensor, cage, steps, end)
         _check_ends(sensor, cage)
         return sensor
 
@@ -269,6 +258,17 @@ def _moves(texts: list[str], option: str) -> list[tuple[str, tuple[float, float,
             raise typer.BadParameter(f"'{text}' is not like 1,*,2=0,0,6", param_hint=option)
         moves.append((which, (x, y, z)))
     return moves
+
+
+def _moved(
+    design: SensorDesign, cage: str, moves: list[tuple[str, tuple[float, float, float]]], shape: str
+) -> SensorDesign:
+    """Return a design with control points of a shape of a cage moved, one move after the other."""
+    from optisense.design.cage_edit import Shape, move_points
+
+    for which, way in moves:
+        design = move_points(design, cage, {which: way}, cast(Shape, shape))
+    return design
 
 
 def _shape(design: SensorDesign, name: str) -> str:

@@ -39,10 +39,7 @@ def check(design: DesignArgument, contact: ContactOption = None) -> None:
         output.print(f"warning: {len(problems) - MOST_WARNINGS:,} more like these", style="yellow")
     for sentence in unusual_fluxes(sensor):
         output.print(f"note: {sentence}")
-    if any(part.role == "mirror" for part in sensor.parts.values()):
-        warnings += _print_views(sensor)
-    if sensor.markers is not None:
-        warnings += _print_markers(sensor)
+    warnings += _print_optics(sensor)
     if contacts:
         from optisense.optics import OpticalModel
 
@@ -60,12 +57,16 @@ def check(design: DesignArgument, contact: ContactOption = None) -> None:
         output.print("The design is in order.", style="green")
 
 
-def _print_views(design: SensorDesign) -> int:
-    """Trace chief rays, and print by which mirrors they go and which mirrors are not used.
+def _print_optics(design: SensorDesign) -> int:
+    """Trace chief rays, and print by which mirrors they go, which mirrors are not used, and how
+    many markers lie off the skin.
 
     Returns:
         The number of warnings.
     """
+    has_mirrors = any(part.role == "mirror" for part in design.parts.values())
+    if not has_mirrors and design.markers is None:
+        return 0
     try:
         from optisense.optics import OpticalModel
         from optisense.optics.mirror_checks import (
@@ -76,40 +77,26 @@ def _print_views(design: SensorDesign) -> int:
             views_in_words,
         )
 
-        size = design.camera.size_at(CHECK_RAYS)
-        views = OpticalModel(design).views_by_mirrors(size)
-        problems = mirror_problems(design, views)
-        smooth = polished(design)
-        if smooth is not None:
-            views_if_smooth = OpticalModel(smooth).views_by_mirrors(size)
-            problems += rough_mirror_problems(design, views_if_smooth)
+        model = OpticalModel(design)
+        problems: list[object] = []
+        if has_mirrors:
+            size = design.camera.size_at(CHECK_RAYS)
+            views = model.views_by_mirrors(size)
+            problems += mirror_problems(design, views)
+            smooth = polished(design)
+            if smooth is not None:
+                views_if_smooth = OpticalModel(smooth).views_by_mirrors(size)
+                problems += rough_mirror_problems(design, views_if_smooth)
+            if views:
+                words = views_in_words(views)
+                output.print(f"Views of the sensing surface, by their mirrors: {words}.")
+        problems += model.marker_notes()
     except SetupError as error:  # the rest of the check needs no renderer
-        output.print(f"note: its mirrors are not checked: {error}", style="yellow")
+        output.print(f"note: its mirrors and markers are not checked: {error}", style="yellow")
         return 0
-    if views:
-        sentence = f"Views of the sensing surface, by their mirrors: {views_in_words(views)}."
-        output.print(sentence)
     for problem in problems:
         output.print(f"warning: {problem}", style="yellow")
     return len(problems)
-
-
-def _print_markers(design: SensorDesign) -> int:
-    """Print how many markers lie off the skin.
-
-    Returns:
-        The number of warnings.
-    """
-    try:
-        from optisense.optics import OpticalModel
-
-        found = OpticalModel(design).marker_notes()
-    except SetupError as error:  # the rest of the check needs no renderer
-        output.print(f"note: its markers are not checked: {error}", style="yellow")
-        return 0
-    for note in found:
-        output.print(f"warning: {note}", style="yellow")
-    return len(found)
 
 
 def _describe(design: SensorDesign) -> int:

@@ -4,7 +4,6 @@ command waits for the imports of others.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, MutableMapping
 from importlib import import_module
 from typing import Any
 
@@ -37,36 +36,18 @@ _MODULES = {
 """The function or group that defines each command, in the module of the command's name."""
 
 
-class _Commands(MutableMapping[str, Any]):
-    """Mapping of commands for Typer's groups, made on first use."""
-
-    def __init__(self) -> None:
-        self._made: dict[str, Any] = {}
-
-    def __getitem__(self, name: str) -> Any:
-        if name not in self._made and name in _MODULES:
-            self._made[name] = _command(name)
-        return self._made[name]
-
-    def __setitem__(self, name: str, command: Any) -> None:
-        self._made[name] = command
-
-    def __delitem__(self, name: str) -> None:
-        del self._made[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(_MODULES)
-
-    def __len__(self) -> int:
-        return len(_MODULES)
-
-
 class Commands(TyperGroup):
-    """Group of all commands of ``optisense``."""
+    """Group of all commands of ``optisense``, each of which is made on first use."""
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
-        self.commands = _Commands()
+        self.commands: dict[str, Any] = dict.fromkeys(_MODULES)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Return the command of a name, or None if there is none."""
+        if cmd_name in _MODULES and self.commands[cmd_name] is None:
+            self.commands[cmd_name] = _command(cmd_name)
+        return self.commands.get(cmd_name)
 
 
 def _command(name: str) -> Any:

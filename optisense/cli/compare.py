@@ -119,21 +119,11 @@ def print_comparison(found: Comparison) -> None:
     """Print a table of the presses, and one of the background."""
     table = table_of("press", "unexplained", "contact", "ring", "similarity", "far field")
     for press in found.realism.presses:
-        table.add_row(
-            press.name,
-            f"{press.unexplained:.2f}",
-            f"{press.contact:.2f}",
-            f"{press.ring:.2f}",
-            f"{press.similarity:.2f}",
-            f"{press.far_smooth:.1f}",
-        )
-    table.add_row(
-        "noise alone",
-        *(f"{found.realism.median_of_noise(name):.2f}" for name in ("unexplained", "contact")),
-        f"{found.realism.median_of_noise('ring'):.2f}",
-        f"{found.realism.median_of_noise('similarity'):.2f}",
-        "",
-    )
+        shown = (press.unexplained, press.contact, press.ring, press.similarity)
+        table.add_row(press.name, *(f"{v:.2f}" for v in shown), f"{press.far_smooth:.1f}")
+    figures = ("unexplained", "contact", "ring", "similarity")
+    noise = (f"{found.realism.median_of_noise(name):.2f}" for name in figures)
+    table.add_row("noise alone", *noise, "")
     output.print(table)
     ground = found.realism.background
     table = table_of("background", "R", "G", "B")

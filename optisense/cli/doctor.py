@@ -74,10 +74,7 @@ def _package() -> Finding:
 
 def _python() -> Finding:
     text = f"{platform.python_version()} on {platform.platform()} ({sys.executable})"
-    good = sys.version_info >= (3, 11)
-    return Finding(
-        "python", "good" if good else "bad", text, "" if good else "Install Python 3.11 or newer"
-    )
+    return Finding("python", "good", text)
 
 
 def _renderer() -> Finding:

@@ -55,44 +55,37 @@ PLACES = {
 
 
 def source_folder() -> Path:
-    """Return the folder of the extension's files: beside the package in a checkout, else where the
-    wheel has installed them.
+    """Return the folder of the extension's files.
 
     Raises:
-        SetupError: the files are in neither place.
+        SetupError: the files are not installed.
     """
-    beside = Path(__file__).parents[2] / "studio"
-    installed = Path(sysconfig.get_path("data")) / "share" / "optisense" / "studio"
-    for folder in (beside, installed):
-        if (folder / MANIFEST).is_file():
-            return folder
-    raise SetupError(
-        "the Blender extension is not part of this installation",
-        where=str(installed),
-        hint="Install OptiSense Studio again",
-    )
+    return _installed("studio", MANIFEST, "the Blender extension").parent
 
 
 def help_pages() -> Iterator[tuple[str, bytes]]:
     """Yield the pages of the documentation that the extension shows, with their names in the zip.
 
-    They are beside the package in a checkout, else where the wheel has installed them.
-
     Raises:
-        SetupError: the files are in neither place.
+        SetupError: a page is not installed.
     """
-    installed = Path(sysconfig.get_path("data")) / "share" / "optisense" / "docs"
     for name in HELP:
         file = f"{name}.md"
-        found = [each / file for each in (Path(__file__).parents[2] / "docs", installed)]
-        page = next((each for each in found if each.is_file()), None)
-        if page is None:
-            raise SetupError(
-                f"the page '{file}' of the help is not part of this installation",
-                where=str(installed),
-                hint="Install OptiSense Studio again",
-            )
+        page = _installed("docs", file, f"the page '{file}' of the help")
         yield f"help/{file}", page.read_bytes()
+
+
+def _installed(folder: str, name: str, what: str) -> Path:
+    """Return a file beside the package in a checkout, or else where the wheel has installed it."""
+    installed = Path(sysconfig.get_path("data")) / "share" / "optisense" / folder
+    for each in (Path(__file__).parents[2] / folder, installed):
+        if (each / name).is_file():
+            return each / name
+    raise SetupError(
+        f"{what} is not part of this installation",
+        where=str(installed),
+        hint="Install OptiSense Studio again",
+    )
 
 
 def version_of(folder: Path) -> str:

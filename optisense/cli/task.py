@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from optisense import tasks
-from optisense.cli.console import handles_errors, messages, output, print_json
+from optisense.cli.console import handles_errors, messages, output, print_json, table_of
 from optisense.cli.options import (
     DesignArgument,
     VariantOption,
@@ -20,7 +21,6 @@ from optisense.cli.options import (
 )
 from optisense.cli.progress import progress_line
 from optisense.cli.sampling import LOADING, load_sensor, sample_progress
-from optisense.cli.task_result import print_perception, print_reconstruction
 from optisense.commands.sampling import CylinderOptions, ReconstructionOptions, SampleOptions
 from optisense.writing import inside
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from optisense.optics import OpticalModel
-    from optisense.tasks import PerceptionTask
+    from optisense.tasks import PerceptionResult, PerceptionTask, ReconstructionResult
 
 RESULT = "result.json"
 FIGURE = "figure.png"
@@ -273,3 +273,54 @@ def _write(folder: Path, values: dict[str, Any], figure: Figure) -> None:
 def _print_folder(out: Path | None) -> None:
     if out is not None:
         output.print(f"results: {out}")
+
+
+def print_perception(results: Iterable[PerceptionResult]) -> None:
+    """Print a row for each task."""
+    heads = ("mean error", "of folds", "baseline error", "signal to noise", "samples")
+    table = table_of("task", *heads)
+    for result in results:
+        reading = result.reading
+        table.add_row(
+            result.task,
+            f"{reading.error:.3g} {result.unit}",
+            f"± {reading.spread:.2g}",
+            f"{reading.guess:.3g} {result.unit}",
+            f"{result.snr:.3g}",
+            f"{len(result.samples.targets)}",
+        )
+    output.print(table)
+
+
+def print_reconstruction(result: ReconstructionResult) -> None:
+    """Print a row for each object, and their mean: degrees of normals, and mm of depths."""
+    heads = ("normals (°)", "if flat (°)", "ring (°)", "depth (mm)", "ring (mm)")
+    table = table_of("object", *heads, "deepest (mm)", "read (mm)")
+    table.columns[0].overflow = "fold"  # long names go on in the next line
+    table.columns[0].no_wrap = False
+    for name, each in result.objects.items():
+        values = each.to_dict()
+        table.add_row(
+            name,
+            f"{each.normal_error:.1f}",
+            f"{values['normal_error_of_reading_nothing']:.1f}",
+            _or_none(each.ring_normal_error, ".1f"),
+            f"{each.depth_error:.3f}",
+            _or_none(each.ring_depth_error, ".3f"),
+            f"{values['deepest']:.2f}",
+            f"{values['deepest_read']:.2f}",
+        )
+    means = (
+        f"{result.normal_error:.1f}",
+        "",
+        _or_none(result.ring_normal_error, ".1f"),
+        f"{result.depth_error:.3f}",
+        _or_none(result.ring_depth_error, ".3f"),
+    )
+    table.add_row("mean", *means, "", "", style="bold")
+    output.print(table)
+
+
+def _or_none(value: float, digits: str) -> str:
+    """Return a number as text; a dash for NaN."""
+    return "-" if math.isnan(value) else f"{value:{digits}}"

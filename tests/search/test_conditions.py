@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from optisense import set_value
-from optisense.cli.verify_result import print_conditions
+from optisense.cli.verify import print_conditions
 from optisense.design import SensorDesign
 from optisense.errors import SearchError, UnknownPartError
 from optisense.objectives.evaluation import Evaluation
