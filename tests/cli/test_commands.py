@@ -68,46 +68,31 @@ def test_each_help_text_is_whole() -> None:
     assert not cut
 
 
-def test_help_does_not_load_the_renderer_or_numpy() -> None:
-    script = (
-        "import sys\n"
-        "from typer.testing import CliRunner\n"
-        "from optisense.cli import app\n"
-        "assert CliRunner().invoke(app, ['render', '--help']).exit_code == 0\n"
-        "heavy = {'mitsuba', 'drjit', 'numpy', 'scipy', 'trimesh', 'matplotlib'}\n"
-        "print(sorted(heavy & set(sys.modules)))\n"
-    )
-    child = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
-    assert child.stdout.strip() == "[]", child.stderr
-
-
-def test_a_command_does_not_wait_for_the_others() -> None:
-    script = (
-        "import sys\n"
-        "from typer.testing import CliRunner\n"
-        "from optisense.cli import app\n"
-        "assert CliRunner().invoke(app, ['render', '--help']).exit_code == 0\n"
-        "commands = {'check', 'search', 'studio', 'library', 'task', 'render'}\n"
-        "print({name for name in commands if f'optisense.cli.{name}' in sys.modules})\n"
-    )
-    child = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
-    assert child.stdout.strip() == "{'render'}", child.stderr
+HEAVY = {"mitsuba", "drjit", "numpy", "scipy", "trimesh", "matplotlib"}
+FOR_OTHERS = {"cma", "dask", "matplotlib", "sklearn", "trimesh", "optisense.search"}
+COMMANDS = {f"optisense.cli.{name}" for name in ("check", "search", "studio", "library", "task")}
 
 
 @pytest.mark.parametrize(
     ("arguments", "needless"),
     [
-        (["check", "gelsight-mini-ideal"], {"drjit", "mitsuba", "scipy.optimize", "jinja2"}),
+        (["render", "--help"], HEAVY | COMMANDS),
+        (["evaluate", "--help"], HEAVY | COMMANDS),
+        (
+            ["check", "gelsight-mini-ideal"],
+            FOR_OTHERS | {"drjit", "mitsuba", "scipy.optimize", "jinja2"},
+        ),
         (
             ["render", OTHER_SENSOR, "--resolution=40x30", "--photons=20000", "--out=here"],
-            {"scipy.optimize", "scipy.stats", "optisense.objectives", "optisense.report.scores"},
+            FOR_OTHERS
+            | {"scipy.optimize", "scipy.stats", "optisense.objectives", "optisense.report.scores"},
         ),
     ],
 )
 def test_a_command_loads_only_what_it_needs(
     arguments: list[str], needless: set[str], tmp_path: Path
 ) -> None:
-    needless = needless | {"cma", "dask", "matplotlib", "sklearn", "trimesh", "optisense.search"}
+    """Neither other commands, nor the renderer or NumPy for its help."""
     script = (
         "import sys\n"
         "from typer.testing import CliRunner\n"

@@ -91,13 +91,6 @@ def test_step_without_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     assert not (tmp_path / "new").exists()
 
 
-def test_an_output_folder_that_is_a_file(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    code, text = run("gelsight-mini-ideal", "--out", str(tmp_path / "file"))
-    assert code == 1
-    assert "file" in text
-
-
 @needs_step
 def test_folders_may_have_names_that_are_not_utf_8(tmp_path: Path) -> None:
     """As Linux allows them; other systems refuse to make the folder."""

@@ -51,3 +51,15 @@ def test_earlier_results_are_replaced(file: str, tmp_path: Path) -> None:
         code, said = run(file, out)
         assert code == 0, said
         assert (out / file).exists()
+
+
+@pytest.mark.parametrize(
+    "command", [*COMMANDS.values(), ("task", "misalignment", MINI)], ids=" ".join
+)
+def test_a_file_is_no_folder(command: tuple[str, ...], tmp_path: Path) -> None:
+    file = tmp_path / "notes.txt"
+    file.write_text("mine")
+    result = CliRunner().invoke(app, [*command, "--out", str(file)])
+    assert result.exit_code == 1
+    assert "is a file" in result.output
+    assert file.read_text() == "mine"

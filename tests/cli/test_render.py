@@ -159,15 +159,6 @@ def test_bad_input_exits_with_2(arguments: tuple[str, ...], tmp_path: Path) -> N
     assert len(text) > 20
 
 
-def test_an_output_folder_that_is_a_file_is_an_error_before_rendering(tmp_path: Path) -> None:
-    file = tmp_path / "notes.txt"
-    file.write_text("mine")
-    code, text = render(*SMALL, "--out", str(file))
-    assert code == 1
-    assert "is a file" in text
-    assert file.read_text() == "mine"
-
-
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
 def test_a_folder_without_write_permission_is_an_error(tmp_path: Path) -> None:
     tmp_path.chmod(0o500)

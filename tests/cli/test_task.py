@@ -105,10 +105,3 @@ def test_bad_input_exits_with_2(arguments: tuple[str, ...], tmp_path: Path) -> N
     assert code == 2, text
     assert len(text) > 20
     assert not list(out.glob("*.csv")) or "estimator" in text
-
-
-def test_an_output_folder_that_is_a_file_is_told(tmp_path: Path) -> None:
-    (tmp_path / "o").write_text("mine")
-    code, text = run("misalignment", "gelsight-mini-ideal", "--out", str(tmp_path / "o"))
-    assert code == 1
-    assert "is a file" in text

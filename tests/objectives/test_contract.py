@@ -22,52 +22,17 @@ def contrast(evaluation, *, percentile=95.0):
 '''
 
 
-class TestRgb2Normal(ObjectiveContract):
-    objective = "rgb2normal"
+BY_SHAPE = {"bend_radius", "draft", "clearance", "cage_roughness"}
+"""Objectives of bent parts, of which the sensor of the contract has none."""
 
 
-class TestNormDiff(ObjectiveContract):
-    objective = "normdiff"
-
-
-class TestAoap(ObjectiveContract):
-    objective = "aoap"
-
-
-class TestProjectionWarping(ObjectiveContract):
-    objective = "2to3pw"
-
-
-class TestCoverage(ObjectiveContract):
-    objective = "coverage"
-
-
-class TestDistortion(ObjectiveContract):
-    objective = "distortion"
-
-
-class TestReading(ObjectiveContract):
-    objective = "reading"
-
-
-class TestDepth(ObjectiveContract):
-    objective = "depth"
-
-
-class TestSharpness(ObjectiveContract):
-    objective = "sharpness"
-
-
-class TestUniformity(ObjectiveContract):
-    objective = "uniformity"
-
-
-class TestShadow(ObjectiveContract):
-    objective = "shadow"
-
-
-class TestPower(ObjectiveContract):
-    objective = "power"
+@pytest.mark.parametrize(
+    "named", [each for each in registry.OBJECTIVES.built_in if each not in BY_SHAPE], scope="class"
+)
+class TestOfThisPackage(ObjectiveContract):
+    @pytest.fixture(autouse=True, scope="class")
+    def name(self, request: pytest.FixtureRequest, named: str) -> None:
+        request.cls.objective, request.cls._kept = named, None
 
 
 class TestFromAFile(ObjectiveContract):
@@ -98,15 +63,3 @@ class TestFromAnInstalledPackage(ObjectiveContract):
         import sys
 
         sys.modules.pop("contrast_scores", None)
-
-
-def test_no_objective_of_the_package_goes_without_the_contract() -> None:
-    tested = {
-        each.objective
-        for each in ObjectiveContract.__subclasses__()
-        if isinstance(getattr(each, "objective", None), str)
-    }
-    # The sensor of the contract has no bent part.
-    by_shape = {"bend_radius", "draft", "clearance", "cage_roughness"}
-    own = {*registry.OBJECTIVES.built_in} - by_shape
-    assert own <= tested

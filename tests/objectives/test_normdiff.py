@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
+from pressed_balls import Presses, pressed_ball
 
 from optisense.errors import ObjectiveError
-from optisense.objectives import Press
 from optisense.objectives.normdiff import azimuth_on_sphere, confusion, normal_cells, normdiff
 
 STEEPEST = 35.0
@@ -111,55 +109,45 @@ def test_each_normal_takes_a_near_grid_normal_and_the_grid_is_even() -> None:
     assert counts.std() < 2.0 * np.sqrt(counts.mean())
 
 
-def test_a_ball_lit_in_three_colours_is_less_confusing_than_in_one(
-    make_press: Callable[..., Press], evaluation_of: Callable[..., Any]
-) -> None:
+def test_a_ball_lit_in_three_colours_is_less_confusing_than_in_one() -> None:
     a = np.radians([0.0, 120.0, 240.0])
     ways = np.stack([0.6 * np.cos(a), 0.6 * np.sin(a), np.full(3, 0.4)], axis=1)
-    three = make_press(lambda n: n @ ways.T, pixels=61)
-    one = make_press(lambda n: n @ ways[[0, 0, 0]].T, pixels=61)
-    best, parts, _ = normdiff(evaluation_of(three), noise=0.05)
-    worst, _, _ = normdiff(evaluation_of(one), noise=0.05)
+    three = pressed_ball(lambda n: n @ ways.T, pixels=61)
+    one = pressed_ball(lambda n: n @ ways[[0, 0, 0]].T, pixels=61)
+    best, parts, _ = normdiff(Presses(three), noise=0.05)
+    worst, _, _ = normdiff(Presses(one), noise=0.05)
     assert worst < 2 * best < 0
     assert -best == pytest.approx(parts["theta_range"] + parts["phi_range"])
     assert len(parts["confusion_map"]["theta"]) == parts["places"][0]["normals"]
 
 
-def test_the_flat_part_of_a_press_is_not_indented(
-    make_press: Callable[..., Press], evaluation_of: Callable[..., Any]
-) -> None:
-    press = make_press(lambda n: n, pixels=101)
-    _, parts, _ = normdiff(evaluation_of(press))
+def test_the_flat_part_of_a_press_is_not_indented() -> None:
+    press = pressed_ball(lambda n: n, pixels=101)
+    _, parts, _ = normdiff(Presses(press))
     tilt = np.degrees(np.arccos(np.clip(press.normals[press.mask][:, 2], -1, 1)))
     assert parts["places"][0]["pixels"] == (tilt > 1.0).sum() < press.mask.sum()
 
 
 @pytest.mark.parametrize(("edge", "whole"), [(0.7, True), (0.3, False), (-0.5, False)])
-def test_a_press_that_the_view_cuts_has_no_score(
-    edge: float, whole: bool, make_press: Callable[..., Press], evaluation_of: Callable[..., Any]
-) -> None:
+def test_a_press_that_the_view_cuts_has_no_score(edge: float, whole: bool) -> None:
     """The edge is that of the view, in contact radii to the right of the middle."""
-    press = make_press(lambda n: n, pixels=101)
+    press = pressed_ball(lambda n: n, pixels=101)
     reach = 1.5 * np.sin(np.arccos(0.8))
     cut = replace(press, mask=press.mask & (press.points[..., 0] < edge * reach))
     if whole:
-        assert normdiff(evaluation_of(cut))[0] < 0.0
+        assert normdiff(Presses(cut))[0] < 0.0
         return
     with pytest.raises(ObjectiveError, match=r"sees only a part of place 1 .* towards 0 degrees"):
-        normdiff(evaluation_of(cut))
+        normdiff(Presses(cut))
 
 
-def test_a_whole_press_on_a_skin_that_lowers_its_tilts_has_a_score(
-    make_press: Callable[..., Press], evaluation_of: Callable[..., Any]
-) -> None:
-    press = make_press(lambda n: n, pixels=101)
+def test_a_whole_press_on_a_skin_that_lowers_its_tilts_has_a_score() -> None:
+    press = pressed_ball(lambda n: n, pixels=101)
     lowered = press.normals * np.float32([0.4, 0.4, 1.0])
     lowered /= np.linalg.norm(lowered, axis=2, keepdims=True)
-    assert normdiff(evaluation_of(replace(press, normals=lowered)))[0] < 0.0
+    assert normdiff(Presses(replace(press, normals=lowered)))[0] < 0.0
 
 
-def test_too_few_pixels_say_where(
-    make_press: Callable[..., Press], evaluation_of: Callable[..., Any]
-) -> None:
+def test_too_few_pixels_say_where() -> None:
     with pytest.raises(ObjectiveError, match=r"place 2 .* has \d+ of the \d+ indented pixels"):
-        normdiff(evaluation_of(make_press(lambda n: n, pixels=7, number=2)))
+        normdiff(Presses(pressed_ball(lambda n: n, pixels=7, number=2)))

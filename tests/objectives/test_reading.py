@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pressed_balls import pressed_ball
 
 import optisense as ots
 from optisense.design import set_value
@@ -59,14 +60,14 @@ class Presses:
 
 
 @pytest.fixture
-def nine(make_press: Callable[..., Press]) -> Callable[..., Presses]:
+def nine() -> Callable[..., Presses]:
     """Nine presses in rows of three, each with the colours of a function of the normals."""
 
     def made(*colours: Colour, turned: float = 0.0) -> Presses:
         presses = []
         for number in range(9):
             colour = colours[number % len(colours)]
-            press = make_press(colour, pixels=PIXELS, number=number + 1, turned=turned)
+            press = pressed_ball(colour, pixels=PIXELS, number=number + 1, turned=turned)
             flat = np.broadcast_to(
                 colour(np.array([[0.0, 0.0, 1.0]])).astype(np.float32), press.response.shape
             )
@@ -149,16 +150,16 @@ def test_four_presses_are_needed(nine: Callable[..., Presses]) -> None:
         reading(few)
 
 
-def test_small_contacts_are_refused(make_press: Callable[..., Press]) -> None:
-    press = make_press(lambertian, pixels=7, number=2)
+def test_small_contacts_are_refused() -> None:
+    press = pressed_ball(lambertian, pixels=7, number=2)
     assert press.mask.sum() < LEAST_PIXELS
     with pytest.raises(ObjectiveError, match=f"of the {LEAST_PIXELS} pixels that it needs"):
         grid_of(press)
 
 
-def test_what_is_read_is_rendered(make_press: Callable[..., Press]) -> None:
+def test_what_is_read_is_rendered() -> None:
     """About so many pixels of a large contact, all of a small one, none beside it."""
-    small, large = (make_press(lambertian, pixels=size) for size in (25, 201))
+    small, large = (pressed_ball(lambertian, pixels=size) for size in (25, 201))
     assert (pixels_to_read(small) == small.mask).all()
     chosen = pixels_to_read(large)
     assert not (chosen & ~large.mask).any()
