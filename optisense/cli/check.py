@@ -92,7 +92,9 @@ def _print_optics(design: SensorDesign) -> int:
                 output.print(f"Views of the sensing surface, by their mirrors: {words}.")
         problems += model.marker_notes()
     except SetupError as error:  # the rest of the check needs no renderer
-        output.print(f"note: its mirrors and markers are not checked: {error}", style="yellow")
+        parts = [*(["mirrors"] if has_mirrors else []), *(["markers"] if design.markers else [])]
+        what = " and ".join(parts)
+        output.print(f"note: its {what} are not checked: {error}", style="yellow")
         return 0
     for problem in problems:
         output.print(f"warning: {problem}", style="yellow")

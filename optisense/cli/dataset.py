@@ -93,11 +93,7 @@ def dataset(
 
 
 def _print_summary(made: Dataset, count: int) -> None:
-    """Print the number of samples, why others failed, and which splits are empty.
-
-    Raises:
-        typer.Exit: there is no sample.
-    """
+    """Print the number of samples, why others failed, and which splits are empty."""
     reasons = Counter(row["reason"] for row in made.failures if int(row["index"]) < count)
     output.print(f"dataset: {made.folder}, {len(made)} samples")
     if reasons:

@@ -133,9 +133,6 @@ def _known(
 
     Args:
         others: formats of the other option, which a user may mean.
-
-    Raises:
-        OptiSenseError: there is no such format, or it can't be loaded.
     """
     wanted = [name.lower() for name in names]
     for name in wanted:

@@ -92,13 +92,7 @@ def _refuse(given: IesOptions | TuningOptions, why: str) -> None:
 
 
 def _from_ies(file: Path, given: IesOptions, name: str | None, description: str | None) -> Added:
-    """Store a light from an IES file; its colour and flux are asked for at a terminal.
-
-    Raises:
-        LibraryError: the file is damaged, or the name is taken.
-        OutputError: the user's folder can't be written.
-        typer.BadParameter: an option is missing while there is no terminal.
-    """
+    """Store a light from an IES file; its colour and flux are asked for at a terminal."""
     from optisense import library
     from optisense.design.ies import read_ies
     from optisense.library.adding import check_new_name
@@ -155,11 +149,6 @@ def _from_tuning(
         given: data that the file lacks.
         name: name for designs; the file's name if None.
         description: description in one line.
-
-    Raises:
-        LibraryError: the file is no tuning file, there is no such camera, or the name is taken.
-        OutputError: the user's folder can't be written.
-        typer.BadParameter: an option is missing.
     """
     from optisense import library
     from optisense.library.tuning import DAYLIGHT

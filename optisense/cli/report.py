@@ -125,11 +125,7 @@ def _pictures(study: Study, count: int, line: ProgressLine) -> dict[int, NDArray
 def _design_views(
     study: Study, photons: int, pictures: bool, line: ProgressLine
 ) -> dict[str, DesignView]:
-    """Return chief rays of the start and of the best trial, with pictures if they are asked for.
-
-    Raises:
-        SetupError: the renderer can't run on this machine, and pictures are asked for.
-    """
+    """Return chief rays of the start and of the best trial, with pictures if they are asked for."""
     from optisense.errors import SetupError
     from optisense.report.before_after import design_view
 

@@ -181,11 +181,6 @@ def _designs(
 ) -> tuple[tuple[str, str], tuple[SensorDesign, SensorDesign], list[ConditionResult]]:
     """Return the names and the designs that are compared, and the results of the trial's
     conditions, which are empty without a study.
-
-    Raises:
-        SearchError: there is no such trial, or it is the start itself.
-        DesignError: there is no such folder or built-in sensor.
-        typer.BadParameter: only one design is named.
     """
     from optisense.errors import SearchError
     from optisense.search import Study
@@ -219,12 +214,7 @@ def _designs(
 
 
 def _model(name: str, design: SensorDesign, variant: str) -> OpticalModel:
-    """Return the optical model of a sensor.
-
-    Raises:
-        SetupError: the renderer can't run on this machine.
-        TaskError: no picture of the design can be taken.
-    """
+    """Return the optical model of a sensor; errors name the sensor."""
     from optisense.errors import OptiSenseError, SetupError, TaskError
     from optisense.optics import OpticalModel
 

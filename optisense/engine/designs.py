@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -187,20 +188,13 @@ class Designs:
         for name, part in design.parts.items():
             if name not in elsewhere:
                 path = _inside(base, part.mesh, f"parts.{name}.mesh")
-                design.meshes[name] = self._checked(self._read(path, name), name, part.role)
+                with _errors_of_part(name):
+                    mesh = self.mesh(str(path))
+                design.meshes[name] = self._checked(mesh, name, part.role)
         for place, value in design.values_of_kinds().items():
             for field, named in value.located(base).files().items():
                 _inside(base, named, dotted((*place, field)))
         return design
-
-    def _read(self, path: Path, part: str) -> TriangleMesh:
-        """Return the mesh of a part; errors about its file name the part."""
-        try:
-            return self.mesh(str(path))
-        except MeshError as error:
-            raise MeshError(
-                f"part '{part}': {error.message}", where=f"parts.{part}.mesh", hint=error.hint
-            ) from error
 
     def _with_meshes(self, design: SensorDesign, meshes: Mapping[str, AnyMesh]) -> SensorDesign:
         design = design.copy()
@@ -220,13 +214,20 @@ class Designs:
         closed = role in TRANSPARENT_SOLIDS
         kept = self._valid.setdefault(mesh, {})
         if closed not in kept:
-            try:
+            with _errors_of_part(name):
                 kept[closed] = mesh.validate(name, closed=closed)
-            except MeshError as error:
-                raise MeshError(
-                    f"part '{name}': {error.message}", where=f"parts.{name}.mesh", hint=error.hint
-                ) from error
         return kept[closed]
+
+
+@contextmanager
+def _errors_of_part(name: str) -> Iterator[None]:
+    """Context in which errors about a mesh name the part."""
+    try:
+        yield
+    except MeshError as error:
+        raise MeshError(
+            f"part '{name}': {error.message}", where=f"parts.{name}.mesh", hint=error.hint
+        ) from error
 
 
 def _same(one: SensorDesign, other: SensorDesign) -> bool:
@@ -241,18 +242,9 @@ def _stamps(design: SensorDesign, file: Path) -> list[Stamp]:
     return [file_stamp(path) for path in (file, *meshes, *others)]
 
 
-def _array(path: str) -> Any:
-    """Return the array in a NumPy file; pickled objects in it are refused."""
-    return read_array(Path(path), MeshError)
-
-
 def _mesh_of_arrays(given: MeshFile) -> TriangleMesh:
-    """Return the mesh of two NumPy files.
-
-    Raises:
-        MeshError: the arrays are not (n, 3) numbers and (m, 3) integers.
-    """
-    vertices, faces = _array(given.vertices), _array(given.faces)
+    """Return the mesh of two NumPy files; pickled objects in them are refused."""
+    vertices, faces = (read_array(Path(path), MeshError) for path in (given.vertices, given.faces))
     for array, path, kinds in ((vertices, given.vertices, "fiu"), (faces, given.faces, "iu")):
         if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in kinds:
             raise MeshError(

@@ -13,12 +13,7 @@ from pydantic import Field
 
 from optisense.commands.rendering import LedgerOptions, RenderOptions
 from optisense.design import LightGroup, SensorDesign, set_value
-from optisense.engine.contacts import (
-    AnyContact,
-    contacts_of,
-    errors_naming_contact,
-    unseen,
-)
+from optisense.engine.contacts import AnyContact, contacts_of, errors_naming_contact, unseen
 from optisense.engine.designs import AnyDesign, AnyMesh
 from optisense.engine.failures import ProtocolError
 from optisense.engine.jobs import Job
@@ -171,7 +166,10 @@ def simulate(session: Session, fields: Simulate, job: Job) -> dict[str, Any]:
             skin=fields.skin,
             progress=_progress_of(job),
         )
-    image.settings["contacts"] = [_text(given) for given in fields.contacts]
+    image.settings["contacts"] = [
+        each if isinstance(each, str) else each.model_dump(exclude_none=True)
+        for each in fields.contacts
+    ]
     exposure = _exposure(image, fields.exposure)
     name = name_of(fields, job.id)
     placed = () if fields.draft else image.indenters.values()
@@ -351,11 +349,7 @@ def _exposure(image: TactileImage, given: float | Literal["auto", "same"]) -> fl
 
 
 def _changed(name: str, lights: Mapping[str, LightGroup], change: LightChange) -> LightGroup:
-    """Return a light group with another flux or colour.
-
-    Raises:
-        ProtocolError: there is no such group, or the colour is black.
-    """
+    """Return a light group with another flux or colour."""
     if name not in lights:
         hint = suggestion(name, lights, limit=20)
         raise ProtocolError(f"the image has no light group '{name}'", where="lights", hint=hint)
@@ -386,7 +380,3 @@ def _checked_size(
 def _size(image: TactileImage) -> list[int]:
     height, width = image.contact_mask.shape
     return [width, height]
-
-
-def _text(given: AnyContact) -> Any:
-    return given if isinstance(given, str) else given.model_dump(exclude_none=True)

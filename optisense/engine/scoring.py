@@ -43,6 +43,7 @@ def objectives(session: Session, fields: Fields, job: Job) -> dict[str, Any]:
 
 
 def _row(objective: Objective) -> dict[str, Any]:
+    bounds = objective.bounds()
     return {
         "name": objective.name,
         "title": objective.title,
@@ -52,13 +53,8 @@ def _row(objective: Objective) -> dict[str, Any]:
         "lower_is_better": objective.lower_is_better,
         "rays_only": objective.rays_only,
         "usual": objective.usual,
-        "range": _finite(objective.bounds()),
+        "range": bounds if all(map(math.isfinite, bounds)) else None,
     }
-
-
-def _finite(bounds: tuple[float, float]) -> tuple[float, float] | None:
-    """Return the lowest and highest value, or None if one is infinite."""
-    return bounds if all(map(math.isfinite, bounds)) else None
 
 
 @handles("evaluate", Evaluate, Lane.RENDER)

@@ -23,7 +23,6 @@ from optisense.sensors import save_design
 
 if TYPE_CHECKING:
     from optisense.search import Study
-    from optisense.search.space.search_space import BoundSpace
 
 
 class Space(DesignFields):
@@ -92,7 +91,14 @@ def space(session: Session, fields: Space, job: Job) -> dict[str, Any]:
 
     design = design_of(session, fields, job)
     bound = SearchSpace(parse_space(fields.vary)).bind(design)
-    return {"parameters": _parameters(bound)}
+    columns = zip(bound.parameters, bound.lower, bound.upper, bound.start, strict=True)
+    rows = []
+    for parameter, lower, upper, start in columns:
+        labels = getattr(parameter.kind, "labels", None)
+        options = None if labels is None else list(labels)
+        row = {"name": parameter.name, "lower": lower, "upper": upper, "start": start}
+        rows.append(row | {"options": options})
+    return {"parameters": rows}
 
 
 @handles("advise", Advise, Lane.QUICK)
@@ -118,24 +124,19 @@ def advise(session: Session, fields: Advise, job: Job) -> dict[str, Any]:
 
 @handles("search", Search, Lane.OWN)
 def search(session: Session, fields: Search, job: Job) -> dict[str, Any]:
-    """Begin a study and follow it to its end."""
+    """Begin a study in a process of its own, and follow it to its end."""
     files = session.files(fields, job.id)
-    with session.priority_gate:
-        child = _begun(session, fields, job)
-    return Following(child.folder, job, files, child).result()
-
-
-def _begun(session: Session, fields: Search, job: Job) -> SearchProcess:
-    """Start the process that runs a new study."""
-    from optisense.search import Study
-
     folder = _absolute(fields.study)
-    design = design_of(session, fields, job)
-    session.designs.require_valid(design)
-    job.check()
-    with own_objectives():
-        Study.create(folder, design, fields.plan()).close()
-    return SearchProcess(folder, fields.workers, None, fields.go_on)
+    with session.priority_gate:
+        from optisense.search import Study
+
+        design = design_of(session, fields, job)
+        session.designs.require_valid(design)
+        job.check()
+        with own_objectives():
+            Study.create(folder, design, fields.plan()).close()
+        child = SearchProcess(folder, fields.workers, None, fields.go_on)
+    return Following(folder, job, files, child).result()
 
 
 @handles("resume", Resume, Lane.OWN)
@@ -230,19 +231,3 @@ def _absolute(folder: str) -> Path:
             hint="Give the absolute path of its folder",
         )
     return path
-
-
-def _parameters(bound: BoundSpace) -> list[dict[str, Any]]:
-    rows = []
-    for number, parameter in enumerate(bound.parameters):
-        labels = getattr(parameter.kind, "labels", None)
-        rows.append(
-            {
-                "name": parameter.name,
-                "lower": bound.lower[number],
-                "upper": bound.upper[number],
-                "start": bound.start[number],
-                "options": None if labels is None else list(labels),
-            }
-        )
-    return rows

@@ -181,11 +181,7 @@ class _KnownPress:
 
     @classmethod
     def of(cls, press: Press) -> _KnownPress:
-        """Collect the data of a press from its images.
-
-        Raises:
-            ObjectiveError: the contact has too few pixels.
-        """
+        """Collect the data of a press from its images."""
         grid = grid_of(press)
         before = press.before[grid].astype(np.float64)
         seen = np.linalg.norm(before, axis=2) > 0.5  # normals are 0 where a ray misses the skin

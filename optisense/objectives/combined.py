@@ -89,12 +89,7 @@ def _measured(
     evaluation: Evaluation,
     settings: Mapping[str, Any],
 ) -> tuple[dict[ScoreTerm, float], dict[str, Any]]:
-    """Return the value of each quantity, and the parts of each objective.
-
-    Raises:
-        ObjectiveError: an objective fails.
-        UnknownPartError: an objective has no such number among its parts.
-    """
+    """Return the value of each quantity, and the parts of each objective."""
     scores = {}
     for name, each in terms.items():
         own = {key: value for key, value in settings.items() if key in each.settings}

@@ -224,11 +224,7 @@ class Evaluation:
         return self.shared("calibration presses", lambda: self._exposed(exposure))
 
     def _contacts(self) -> list[Contact]:
-        """Return contacts at the places that the user named, or at nine that cover the view.
-
-        Raises:
-            ObjectiveError: the camera sees too little of the surface for nine places.
-        """
+        """Return contacts at the places that the user named, or at nine that cover the view."""
         ball = Sphere(self.settings.radius)
         if self.settings.places is None:
             self.view.refuse_less(self.settings)
@@ -391,9 +387,6 @@ class Evaluation:
         """Render one image, which advances the progress from `done` by `part`.
 
         `what` is reported with the progress; if it is empty, the stage of the render is.
-
-        Raises:
-            KeyboardInterrupt: Ctrl-C was pressed; no score is computed from a part of the light.
         """
 
         def report(progress: RenderProgress) -> None:
@@ -410,7 +403,7 @@ class Evaluation:
             progress=report,
             only_contacts=bool(contacts),
             pixel_importance=pixel_importance,
-            partial=False,
+            partial=False,  # no score is computed from a part of the light
             skin=self.settings.skin,
         )
         return image

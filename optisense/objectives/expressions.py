@@ -176,11 +176,7 @@ class _Parser:
         self._found: dict[ScoreTerm, None] = {}
 
     def expression(self) -> Expression:
-        """Parse the whole text.
-
-        Raises:
-            ObjectiveError: the text is not an expression; the message marks the place.
-        """
+        """Parse the whole text."""
         tree = self._sum()
         token = self._peek()
         if token.kind != "end":

@@ -221,15 +221,10 @@ def _indentation(
 
 
 def _refuse_cut(press: Press, theta: FloatArray, phi: FloatArray) -> None:
-    """Refuse a press of which the camera sees only a part.
+    """Refuse a press of which the camera sees only a part: one whose steepest tilt towards some
+    direction is below `LEAST_SHARE` of the steepest one towards any.
 
-    Args:
-        press: the press.
-        theta, phi: (n,) polar angles and azimuths of its indented pixels, degrees.
-
-    Raises:
-        ObjectiveError: the steepest tilt towards a direction is below `LEAST_SHARE` of the steepest
-            one towards any.
+    `theta` and `phi` are the polar angles and azimuths (n,) of its indented pixels, degrees.
     """
     angles = np.arange(DIRECTIONS) * 360.0 / DIRECTIONS
     towards = (theta * np.cos(np.radians(phi - angles[:, None]))).max(axis=1)

@@ -225,18 +225,10 @@ def objective(
     Args:
         name: unused name in lower case.
         title: display name; ``name`` by default.
-        draw: function that draws the figure of a score; a plain figure by default.
-        beside: names of the parts that are shown beside the value.
-        reads: function that gives the pixels of a press that are read, if not all one by one (see
-            `Objective`).
-        range: the lowest and the highest value, as in `Objective`; any number by default.
-        unit: unit of the value.
-        lower_is_better: whether a lower value is better.
-        rays_only: whether it traces chief rays only and needs no light, as every function of the
-            design.
-        usual: a poor and a good value, for comparison.
-        numbers: names of all its parts that are numbers, if they are the same for all sensors; an
-            expression with any other name is then refused before a sensor is scored.
+        draw, beside, reads, range, unit, lower_is_better, usual: see `Objective`.
+        rays_only: see `Objective`; true of every function of the design.
+        numbers: see `Objective`; an expression with any other name is refused before a sensor is
+            scored.
 
     Raises:
         ObjectiveError: the name is taken or malformed, or the function takes no evaluation.

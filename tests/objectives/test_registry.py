@@ -1,4 +1,4 @@
-"""Finding objectives by name, from a file or an installed package, refusing bad ones, and their values."""
+"""Finding objectives by name, from a file or an installed package, and what their values mean."""
 
 from __future__ import annotations
 
@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-import optisense
 import optisense as ots
 from optisense.errors import ObjectiveError
 from optisense.objectives import BUILT_IN, find, names
-from optisense.objectives.registry import find, forgetting, names
+from optisense.objectives.registry import forgetting
 from optisense.objectives.score import deviation_of
 
 OWN = '''
@@ -83,8 +82,8 @@ def test_a_function_of_the_design_in_a_file_is_given_the_design(head: str, tmp_p
     path.write_text(f"{head}\n    return {given}.lights['red'].flux\n")
     found = find(f"{path}:flux")
     assert found.rays_only
-    design = optisense.load("gelsight-mini-ideal")
-    assert optisense.evaluate(design, found).value == design.lights["red"].flux
+    design = ots.load("gelsight-mini-ideal")
+    assert ots.evaluate(design, found).value == design.lights["red"].flux
 
 
 def test_an_edited_file_is_read_again_even_at_the_same_time_and_size(
@@ -129,7 +128,7 @@ def test_a_bad_file_says_what_is_wrong(
 
 def test_running_a_cell_again_replaces_its_own_objective() -> None:
     def cell(value: float) -> Callable[..., float]:
-        @optisense.objective("again")
+        @ots.objective("again")
         def again(evaluation: Any) -> float:
             return value
 
