@@ -73,6 +73,7 @@ def read_mesh(path: Path) -> MeshArrays:
             _refuse_cut_off_stl(data, path)
         mesh = _load_with_trimesh(data, path, suffix)
     _refuse_many(len(mesh.faces), path)
+    _refuse_unknown_vertices(mesh.faces, len(mesh.vertices), path)
     far = np.abs(mesh.vertices).max(axis=1, initial=0.0)
     if (far[np.isfinite(far)] > FARTHEST).any():
         number = int(np.flatnonzero((far > FARTHEST) & np.isfinite(far))[0])
@@ -83,7 +84,14 @@ def read_mesh(path: Path) -> MeshArrays:
         )
     apart = mesh.normals is None and len(mesh.vertices) == 3 * len(mesh.faces)
     if apart and np.isfinite(far).all():  # as in all STL files, which have no common vertices
-        mesh = MeshArrays(*welded(mesh.vertices, mesh.faces, WELD_DISTANCE))
+        whole = MeshArrays(*welded(mesh.vertices, mesh.faces, WELD_DISTANCE))
+        if len(mesh.faces) and not len(whole.faces):
+            raise MeshError(
+                f"all triangles of the mesh collapse: they are smaller than {WELD_DISTANCE:g}",
+                where=str(path),
+                hint="Check the unit of the file, or export it again",
+            )
+        mesh = whole
     if len(mesh.faces) == 0:
         raise MeshError(
             "the mesh file has no triangles", where=str(path), hint="Export a surface, not points"
@@ -104,6 +112,16 @@ def _refuse_many(triangles: int, path: Path) -> None:
             f"the mesh has {triangles:,} triangles; at most {MOST_TRIANGLES:,} are read",
             where=str(path),
             hint="Export it with a larger deviation, or simplify it in a modelling program",
+        )
+
+
+def _refuse_unknown_vertices(corners: NDArray[np.integer], count: int, path: Path) -> None:
+    unknown = corners[(corners < 0) | (corners >= count)]
+    if unknown.size:
+        raise MeshError(
+            f"a face names vertex {unknown[0] + 1}, but there are {count}",
+            where=str(path),
+            hint="Export the mesh again",
         )
 
 
@@ -242,6 +260,8 @@ def _parse_obj(data: bytes, path: Path) -> MeshArrays:
                 hint="Export the mesh again",
             ) from error
     vertices = np.array(positions, dtype=np.float64).reshape(-1, 3)
+    named = np.array([vertex for polygon in polygons for vertex in polygon], dtype=np.int64)
+    _refuse_unknown_vertices(named, len(vertices), path)
     faces = _triangulated(polygons, vertices)
     keep_normals = own_normals and len(normals) == len(vertices) > 0
     return MeshArrays(vertices, faces, np.array(normals) if keep_normals else None)
@@ -266,11 +286,6 @@ def _index(field: str, count: int) -> int:
 def _triangulated(polygons: list[list[int]], vertices: NDArray[np.float64]) -> NDArray[np.int32]:
     faces: list[list[int]] = []
     for polygon in polygons:
-        if max(polygon) >= len(vertices):
-            raise MeshError(
-                f"a face names vertex {max(polygon) + 1}, but there are {len(vertices)}",
-                hint="Export the mesh again",
-            )
         if len(polygon) == 3:
             faces.append(polygon)
         else:

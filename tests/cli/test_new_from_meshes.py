@@ -20,6 +20,7 @@ from optisense.design import SensorDesign, add_cage
 from optisense.design.camera import ImagingModel
 from optisense.geometry import TriangleMesh
 from optisense.sensors.from_meshes import read_recipe
+from tests.helpers.mesh_files import triangle_ply
 
 CAD = Path(__file__).parents[2] / "docs" / "examples" / "pad-sensor"
 
@@ -166,6 +167,13 @@ def test_guesses_that_do_not_fit_are_kept_to_be_mended(tmp_path: Path) -> None:
     assert not (folder / "design.yaml").exists()
     gel.save_obj(cad / "gel.obj")
     assert new("--from-meshes", folder / "recipe.yaml", folder, "--overwrite")[0] == 0
+
+
+def test_a_mesh_file_with_unknown_vertices_is_named(tmp_path: Path) -> None:
+    (tmp_path / "gel.ply").write_text(triangle_ply("0 1 7"))
+    code, text = new("--from-meshes", tmp_path, tmp_path / "pad", "--yes")
+    assert code == 2
+    assert "names vertex 8, but there are 3" in text and "gel.ply" in text
 
 
 def test_guesses_are_told(tmp_path: Path) -> None:

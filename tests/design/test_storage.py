@@ -16,6 +16,7 @@ from optisense.design.cage import Share
 from optisense.design.kinds import KindModel
 from optisense.errors import DesignError, MeshError, OutputError
 from optisense.geometry import TriangleMesh
+from tests.helpers.mesh_files import triangle_ply
 
 ASSET = Path(__file__).parents[1] / "assets" / "design-v1"
 
@@ -241,6 +242,13 @@ class TestErrors:
     def test_a_bad_mesh_names_part_and_place(self, folder: Path, text: str, told: str) -> None:
         (folder / "meshes/gel.obj").write_text(text)
         with pytest.raises(MeshError, match=told):
+            load_design(folder)
+
+    @pytest.mark.parametrize(("face", "told"), [("0 1 7", "vertex 8"), ("0 1 -1", "vertex 0")])
+    def test_a_ply_file_with_unknown_vertices(self, folder: Path, face: str, told: str) -> None:
+        (folder / "meshes/gel.ply").write_text(triangle_ply(face))
+        edit(folder, "meshes/gel.obj", "meshes/gel.ply")
+        with pytest.raises(MeshError, match=rf"{told}, but there are 3"):
             load_design(folder)
 
     def test_a_solid_turned_inside_out_is_turned_back(

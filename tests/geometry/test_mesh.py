@@ -101,6 +101,7 @@ def test_obj_polygons_are_triangulated_even_when_concave(tmp_path: Path) -> None
         ("v 0 0 0\nv 1 0 0\nf 1 2\n", ":3"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "vertex 9"),
         ("v 0 0 0\n", "no triangles"),
+        ("v 0 0 0\nv 1e-8 0 0\nv 0 1e-8 0\nf 1 2 3\n", "all triangles of the mesh collapse"),
     ],
 )
 def test_malformed_obj_names_the_place(tmp_path: Path, text: str, expected: str) -> None:
