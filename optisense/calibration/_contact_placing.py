@@ -15,10 +15,10 @@ import numpy as np
 from optisense.array_types import FloatArray
 from optisense.calibration._gauss_newton import LayeredFit
 from optisense.calibration._layered_pictures import layered_pictures
-from optisense.calibration.kept_renderings import KEPT_NOWHERE, KeptRenderings
 from optisense.calibration.model_pictures import matched_exposure
 from optisense.calibration.photographs import Photographs
 from optisense.calibration.seen_contacts import SeenContact
+from optisense.kept_arrays import NOTHING_KEPT, KeptArrays
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
@@ -51,7 +51,7 @@ def placed(
     photons: int,
     seed: int,
     exposure: float | None = None,
-    kept: KeptRenderings = KEPT_NOWHERE,
+    kept: KeptArrays = NOTHING_KEPT,
 ) -> list[SeenContact]:
     """Return the contacts where the model's responses are closest to the photographs'.
 

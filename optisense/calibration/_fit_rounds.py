@@ -26,7 +26,6 @@ from optisense.calibration._layered_pictures import (
 from optisense.calibration._solution import Solution
 from optisense.calibration._view_slopes import view_changes, with_view
 from optisense.calibration.families import EXPOSURE
-from optisense.calibration.kept_renderings import KeptRenderings
 from optisense.calibration.model_pictures import matched_exposure
 from optisense.calibration.photographs import Photographs
 from optisense.calibration.quantities import designed, fits_all_powers
@@ -34,6 +33,7 @@ from optisense.calibration.quantity import FitQuantity
 from optisense.calibration.seen_contacts import SeenContact
 from optisense.calibration.settings import CalibrationSettings
 from optisense.design import SensorDesign
+from optisense.kept_arrays import KeptArrays
 from optisense.quality import MOST_SEED
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ class FitRounds:
         seen: list[SeenContact],
         chosen: list[FitQuantity],
         settings: CalibrationSettings,
-        kept: KeptRenderings,
+        kept: KeptArrays,
         progress: Progress,
     ) -> None:
         self._design, self._model, self._settings = design, model, settings

@@ -18,9 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.calibration._covered_view import CoveredView, with_smooth_outline
-from optisense.calibration.kept_renderings import KEPT_NOWHERE, KeptRenderings
 from optisense.calibration.photographs import Photographs
 from optisense.calibration.seen_contacts import SeenContact, contact_of
+from optisense.design.difference import fingerprint
+from optisense.kept_arrays import NOTHING_KEPT, KeptArrays
 from optisense.mechanics import ELASTIC
 
 if TYPE_CHECKING:
@@ -99,7 +100,7 @@ def layered_pictures(
     photons: int,
     seed: int,
     contacts: Sequence[Contact] | None = None,
-    kept: KeptRenderings = KEPT_NOWHERE,
+    kept: KeptArrays = NOTHING_KEPT,
     progress: Callable[[int], None] = lambda done: None,
 ) -> LayeredPictures:
     """Render the background and the presses of photographs as layers.
@@ -108,6 +109,7 @@ def layered_pictures(
         photographs: photographs whose size and presses are used.
         photons: number of photons of the light that all pictures share.
         contacts: contacts to press in, if they are known already.
+        kept: store of the layers of each picture.
         progress: function that is called with the number of finished pictures.
 
     Raises:
@@ -123,11 +125,10 @@ def layered_pictures(
     pictures: list[FloatArray] = []
     for number, pressed in enumerate([(), *((contact,) for contact in contacts)]):
         progress(number)
-        layers = kept.layers(
-            model.design,
-            pressed,
-            (photographs.size, photons, seed),
+        layers = kept.arrays(
+            [fingerprint(model.design), *pressed, photographs.size, photons, seed],
             partial(_rendered, model, pressed, photographs.size, photons, seed),
+            list(model.design.lights),
         )
         pictures.append(with_smooth_outline(np.stack(list(layers.values())), view.coverage))
     return LayeredPictures(

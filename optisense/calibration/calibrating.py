@@ -18,7 +18,6 @@ from optisense.calibration._fitted_numbers import (
 from optisense.calibration._orientation import orientation_notes
 from optisense.calibration.comparing import Comparison, usable
 from optisense.calibration.families import LEDS
-from optisense.calibration.kept_renderings import KEPT_NOWHERE, KeptRenderings
 from optisense.calibration.model_pictures import model_pictures
 from optisense.calibration.photographs import Photographs
 from optisense.calibration.quantities import designed, fits_all_powers, quantities_of
@@ -28,6 +27,7 @@ from optisense.calibration.seen_contacts import check_shape
 from optisense.calibration.settings import CalibrationSettings
 from optisense.design import Provenance, SensorDesign, Status, set_value
 from optisense.errors import CalibrationError
+from optisense.kept_arrays import NOTHING_KEPT, KeptArrays
 
 LEAST_PRESSES = 2
 """Smallest number of presses of a fit: one ball's response could be due to its place alone."""
@@ -46,7 +46,7 @@ def calibrate(
     settings: CalibrationSettings | None = None,
     *,
     variant: str = "auto",
-    kept: KeptRenderings = KEPT_NOWHERE,
+    kept: KeptArrays = NOTHING_KEPT,
     progress: Progress = lambda what, done, count: None,
 ) -> Calibration:
     """Fit a design to photographs of a real sensor.

@@ -14,11 +14,11 @@ from scipy.optimize import minimize_scalar
 from optisense.array_types import FloatArray
 from optisense.calibration._covered_view import with_smooth_outline
 from optisense.calibration._layered_pictures import layered_pictures
-from optisense.calibration.kept_renderings import KEPT_NOWHERE, KeptRenderings
 from optisense.calibration.photographs import Photographs
 from optisense.calibration.seen_contacts import SeenContact, check_shape
 from optisense.errors import CalibrationError
 from optisense.geometry import Contact
+from optisense.kept_arrays import NOTHING_KEPT, KeptArrays
 
 if TYPE_CHECKING:
     from optisense.design.responses import PictureChain
@@ -53,7 +53,7 @@ def model_pictures(
     photons: int,
     seed: int = 0,
     exposure: float | None = None,
-    kept: KeptRenderings = KEPT_NOWHERE,
+    kept: KeptArrays = NOTHING_KEPT,
     progress: Callable[[int], None] = lambda done: None,
 ) -> ModelPictures:
     """Render the background and the presses of photographs.

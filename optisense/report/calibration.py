@@ -7,13 +7,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 from optisense.calibration.calibrating import calibrate
-from optisense.calibration.kept_renderings import KeptRenderings
 from optisense.calibration.photographs import Photographs
 from optisense.calibration.realism import PATCH, Realism
 from optisense.calibration.result import Calibration
 from optisense.calibration.settings import CalibrationSettings
 from optisense.design import SensorDesign, save_design
 from optisense.folders import held
+from optisense.kept_arrays import KeptArrays
 from optisense.report._files import page
 from optisense.report.comparison import (
     CONTRAST,
@@ -28,6 +28,9 @@ from optisense.writing import write_json, write_text, written_together
 
 JSON_FILE, PAGE_FILE = "calibration.json", "calibration.html"
 """Files of a calibration beside those of the fitted design."""
+
+RENDERINGS = "renderings"
+"""Subfolder of a calibration in which its renderings are kept while it runs."""
 
 FIGURES = {
     "unexplained": "unexplained, patch of 1.35 radii",
@@ -73,7 +76,7 @@ def calibrate_into(
         OptiSenseError: the design can't be rendered, or the folder can't be written.
     """
     with held(folder):
-        kept = KeptRenderings(folder)
+        kept = KeptArrays(folder / RENDERINGS)
         found = calibrate(
             design, photographs, settings, variant=variant, kept=kept, progress=progress
         )

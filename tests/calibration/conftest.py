@@ -12,12 +12,12 @@ from optisense.calibration._fit_rounds import FitRounds
 from optisense.calibration._fitted_numbers import FittedNumber, fitted_numbers, with_known_total
 from optisense.calibration._layered_pictures import LayeredPictures, layered_pictures
 from optisense.calibration.comparing import usable
-from optisense.calibration.kept_renderings import KEPT_NOWHERE
 from optisense.calibration.quantities import designed
 from optisense.calibration.quantity import FitQuantity
 from optisense.calibration.seen_contacts import ContactFinder, SeenContact
 from optisense.calibration.settings import CalibrationSettings
 from optisense.design import SensorDesign
+from optisense.kept_arrays import NOTHING_KEPT
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
@@ -84,7 +84,7 @@ def numbers_of_fit(
     """
     full, seen, _ = usable(photographs, refine=settings.refine)
     rounds = FitRounds(
-        design, ots.OpticalModel(design), full, seen, chosen, settings, KEPT_NOWHERE,
+        design, ots.OpticalModel(design), full, seen, chosen, settings, NOTHING_KEPT,
         lambda what, done, count: None,
     )  # fmt: skip
     solution = rounds.run()

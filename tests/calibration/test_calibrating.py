@@ -21,7 +21,6 @@ from optisense.calibration._layered_pictures import LayeredPictures, layered_pic
 from optisense.calibration._solution import Solution
 from optisense.calibration.calibrating import _with_exposure, calibrate
 from optisense.calibration.families import chosen_families
-from optisense.calibration.kept_renderings import KeptRenderings
 from optisense.calibration.quantities import designed, quantities_of
 from optisense.calibration.realism import Realism, distances
 from optisense.calibration.result import ADVICE, Calibration
@@ -30,6 +29,7 @@ from optisense.calibration.settings import CalibrationSettings
 from optisense.cli import app
 from optisense.design import Status, get_value, set_value
 from optisense.errors import CalibrationError
+from optisense.kept_arrays import KeptArrays
 from optisense.sensors import gelsight_mini_ideal
 
 from .conftest import PHOTONS, PLACES, SMALLER, numbers_of_fit
@@ -309,7 +309,7 @@ def test_an_interrupted_calibration_goes_on_where_it_was(
     settings = CalibrationSettings(families=("powers",), rounds=1, photons=20_000, held_out=())
     two = small_photographs.subset([0, 1])
     design = mini.design
-    kept = KeptRenderings(tmp_path)
+    kept = KeptArrays(tmp_path / "renderings")
 
     def stop(what: str, done: int, count: int) -> None:
         if what == "fitting":

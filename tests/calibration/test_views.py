@@ -14,11 +14,11 @@ from optisense.calibration._covered_view import CoveredView, with_smooth_outline
 from optisense.calibration._fit_rounds import FitRounds
 from optisense.calibration._layered_pictures import LayeredPictures
 from optisense.calibration._view_slopes import displacements, view_changes
-from optisense.calibration.kept_renderings import KEPT_NOWHERE
 from optisense.calibration.quantities import designed, quantities_of
 from optisense.calibration.seen_contacts import SeenContact
 from optisense.calibration.settings import CalibrationSettings
 from optisense.design.posing import with_camera_turned
+from optisense.kept_arrays import NOTHING_KEPT
 
 from .conftest import PHOTONS, PLACES, SIZE, SMALL, numbers_of_fit
 
@@ -163,7 +163,7 @@ def test_a_fisheye_whose_view_is_far_from_the_start_is_found() -> None:
     settings = CalibrationSettings(families=("view",), rounds=1, refine=False, photons=PHOTONS)
     rounds = FitRounds(
         design, ots.OpticalModel(design), replace(taken, presses=tuple(labelled)), [place], chosen,
-        settings, KEPT_NOWHERE, lambda what, done, count: None,
+        settings, NOTHING_KEPT, lambda what, done, count: None,
     )  # fmt: skip
     solution = rounds.run()
     (field,) = chosen

@@ -15,7 +15,7 @@ import yaml
 
 import optisense as ots
 from optisense.calibration import photograph_model, save_photographs
-from optisense.calibration.kept_renderings import FOLDER
+from optisense.report.calibration import RENDERINGS
 from optisense.search import Study
 
 from .agreement import agrees
@@ -193,7 +193,7 @@ def half_files(folder: Path, whole: dict[str, bytes | None]) -> list[str]:
         hidden = any(part.startswith(".") for part in path.relative_to(folder).parts)
         if hidden or not path.is_file() or _of_the_store(path):
             continue
-        kept = path.parent.name == FOLDER  # for the next run, until the calibration has ended
+        kept = path.parent.name == RENDERINGS  # for the next run, until the calibration has ended
         wrong = _wrong(path, None if kept else whole.get(name, b""))
         if wrong or (name not in whole and not kept):
             odd.append(f"{name}: {wrong or 'is not in the result'}")
