@@ -23,13 +23,13 @@ import optisense as ots
 from benchmarks.results import measure_parts, page_head
 from optisense.calibration import PhotographedPress, Photographs, calibrate, photograph_model
 from optisense.calibration._fit_rounds import AGAIN
-from optisense.calibration._fitted_numbers import with_known_total
 from optisense.calibration._gauss_newton import LayeredFit
 from optisense.calibration._layered_pictures import LayeredPictures, averaged, layered_pictures
 from optisense.calibration.families import USUAL
 from optisense.calibration.model_pictures import levels_of, matched_exposure
 from optisense.calibration.quantities import chain_with, designed, power_factors, quantities_of
 from optisense.calibration.quantity import FitQuantity
+from optisense.calibration.result import with_known_total
 from optisense.calibration.seen_contacts import SeenContact, place_on_skin
 from optisense.design import SensorDesign
 from optisense.geometry import Contact

@@ -7,9 +7,8 @@ from functools import partial
 
 import numpy as np
 
-from optisense.calibration import _camera_changes
 from optisense.calibration.quantity import FitQuantity
-from optisense.design import SensorDesign
+from optisense.design import SensorDesign, set_value
 from optisense.design.kinds import KindModel
 from optisense.design.lenses.shading import RadialShading
 from optisense.design.posing import with_camera_turned
@@ -179,7 +178,7 @@ def place(design: SensorDesign) -> list[FitQuantity]:
         FitQuantity(
             f"camera.across.{axis}", f"place of the camera {words}", "mm", 0.0, -10.0, 10.0,
             PLACE_RANGE, renders=True, views=True,
-            change=partial(_camera_changes.with_camera_moved, number), home="camera.position",
+            change=partial(with_camera_moved, number), home="camera.position",
         )
         for number, (axis, words) in enumerate(
             (("right", "to the picture's right"), ("up", "to its top"))
@@ -201,7 +200,7 @@ def pose(design: SensorDesign) -> list[FitQuantity]:
     ]  # fmt: skip
     ahead = FitQuantity(
         "camera.along", "place of the camera towards the skin", "mm", 0.0, -5.0, 5.0, AHEAD_RANGE,
-        renders=True, views=True, change=partial(_camera_changes.with_camera_moved, 2),
+        renders=True, views=True, change=partial(with_camera_moved, 2),
         home="camera.position",
     )  # fmt: skip
     return [*found, ahead]
@@ -217,6 +216,24 @@ def distortion(design: SensorDesign) -> list[FitQuantity]:
         FitQuantity(
             "camera.distortion.k1", "radial distortion of the lens (k1)", "", start,
             min(start, -0.5), max(start, 0.5), DISTORTION_RANGE, renders=True, views=True,
-            change=_camera_changes.with_distortion, home="camera.distortion",
+            change=with_distortion, home="camera.distortion",
         )
     ]  # fmt: skip
+
+
+def with_camera_moved(axis: int, design: SensorDesign, amount: float) -> SensorDesign:
+    """Return a design whose camera is moved by `amount` mm along one of its axes: to the picture's
+    right (0), to its top (1) or ahead (2).
+    """
+    moved = np.array(design.camera.position) + amount * design.camera.axes()[axis]
+    return set_value(design, "camera.position", tuple(moved.tolist()))
+
+
+def with_distortion(design: SensorDesign, k1: float) -> SensorDesign:
+    """Return a design with another first coefficient of its lens's radial distortion."""
+    own = design.camera.distortion
+    if own is not None:
+        return set_value(design, "camera.distortion.k1", k1)
+    fisheye = design.camera.projection == "equidistant"
+    kind = "kannala-brandt" if fisheye else "brown-conrady"
+    return set_value(design, "camera.distortion", {"kind": kind, "k1": k1})

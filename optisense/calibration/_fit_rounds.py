@@ -23,7 +23,7 @@ from optisense.calibration._layered_pictures import (
     averaged,
     layered_pictures,
 )
-from optisense.calibration._solution import Solution
+from optisense.calibration._least_squares import Solution
 from optisense.calibration._view_slopes import view_changes, with_view
 from optisense.calibration.families import EXPOSURE
 from optisense.calibration.model_pictures import matched_exposure

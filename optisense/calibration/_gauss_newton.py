@@ -22,22 +22,22 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from optisense.array_types import FloatArray
-from optisense.calibration._correlated_errors import HUBER
 from optisense.calibration._covered_view import outline_of, with_smooth_outline
-from optisense.calibration._expected_errors import Scales, expected_errors
+from optisense.calibration._error_scales import HUBER, Scales, expected_errors
 from optisense.calibration._far_field import without_drift
 from optisense.calibration._layered_pictures import (
     LayeredPictures,
     PictureSlopes,
     contact_slopes,
 )
-from optisense.calibration._noisy_slopes import slope_reduction
-from optisense.calibration._normal_equations import (
+from optisense.calibration._least_squares import (
     LinearEquations,
+    Solution,
+    jackknife_covariance,
     noise_energy,
     normal_equations,
+    slope_reduction,
 )
-from optisense.calibration._solution import Solution, jackknife_covariance
 from optisense.calibration.model_pictures import levels_of
 from optisense.calibration.photographs import Photographs
 from optisense.calibration.quantities import chain_with, power_factors

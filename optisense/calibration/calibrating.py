@@ -9,12 +9,6 @@ from optisense.calibration._body_changes import with_single_lights
 from optisense.calibration._camera_families import notes_on_kinds
 from optisense.calibration._cross_readings import realism_and_readings
 from optisense.calibration._fit_rounds import FitRounds, Progress
-from optisense.calibration._fitted_numbers import (
-    FittedNumber,
-    correlated_pairs,
-    fitted_numbers,
-    with_known_total,
-)
 from optisense.calibration._orientation import orientation_notes
 from optisense.calibration.comparing import Comparison, usable
 from optisense.calibration.families import LEDS
@@ -22,7 +16,13 @@ from optisense.calibration.model_pictures import model_pictures
 from optisense.calibration.photographs import Photographs
 from optisense.calibration.quantities import designed, fits_all_powers, quantities_of
 from optisense.calibration.quantity import FitQuantity
-from optisense.calibration.result import Calibration
+from optisense.calibration.result import (
+    Calibration,
+    FittedNumber,
+    correlated_pairs,
+    fitted_numbers,
+    with_known_total,
+)
 from optisense.calibration.seen_contacts import check_shape
 from optisense.calibration.settings import CalibrationSettings
 from optisense.design import Provenance, SensorDesign, Status, set_value

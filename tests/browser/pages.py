@@ -7,12 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from optisense.calibration._fitted_numbers import FittedNumber
 from optisense.calibration.comparing import Comparison
 from optisense.calibration.model_pictures import ModelPictures
 from optisense.calibration.photographs import PhotographedPress, Photographs
 from optisense.calibration.realism import realism
-from optisense.calibration.result import Calibration
+from optisense.calibration.result import Calibration, FittedNumber
 from optisense.calibration.seen_contacts import SeenContact
 from optisense.design import Provenance, SensorDesign
 from optisense.geometry import Contact, Sphere

@@ -15,15 +15,19 @@ from typer.testing import CliRunner
 import optisense as ots
 from optisense.calibration import Photographs, photograph_model, save_photographs
 from optisense.calibration._body_changes import with_lights_moved, with_single_lights
-from optisense.calibration._fitted_numbers import fitted_numbers, with_known_total
 from optisense.calibration._gauss_newton import LayeredFit
 from optisense.calibration._layered_pictures import LayeredPictures, layered_pictures
-from optisense.calibration._solution import Solution
+from optisense.calibration._least_squares import Solution
 from optisense.calibration.calibrating import _with_exposure, calibrate
 from optisense.calibration.families import chosen_families
 from optisense.calibration.quantities import designed, quantities_of
 from optisense.calibration.realism import Realism, distances
-from optisense.calibration.result import ADVICE, Calibration
+from optisense.calibration.result import (
+    ADVICE,
+    Calibration,
+    fitted_numbers,
+    with_known_total,
+)
 from optisense.calibration.seen_contacts import SeenContact
 from optisense.calibration.settings import CalibrationSettings
 from optisense.cli import app

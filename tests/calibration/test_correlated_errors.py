@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from optisense.calibration._correlated_errors import UNCORRELATED, correlated_pixels
+from optisense.calibration._error_scales import UNCORRELATED, correlated_pixels
 
 SIZE = (240, 320)
 

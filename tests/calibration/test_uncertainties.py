@@ -12,7 +12,7 @@ import optisense as ots
 from optisense.calibration import Photographs
 from optisense.calibration._gauss_newton import LayeredFit
 from optisense.calibration._layered_pictures import LayeredPictures, PictureSlopes, averaged
-from optisense.calibration._solution import jackknife_covariance
+from optisense.calibration._least_squares import jackknife_covariance
 from optisense.calibration.quantities import quantities_of
 from optisense.calibration.seen_contacts import SeenContact
 
