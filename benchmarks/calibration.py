@@ -163,7 +163,7 @@ def errors_of(
     """
     chain = chain_with(real.chain, chosen, hidden)
     factors = power_factors(real.groups, chosen, hidden).astype(np.float32)
-    shown = [np.tensordot(factors, each, axes=1) for each in (real.background, *real.presses)]
+    shown = [np.tensordot(factors, each, axes=1) for each in real.pictures]
     exposure = chain.auto_exposure(shown[0])
     levels = [np.clip(np.round(levels_of(each, chain, exposure)), 0, 255) for each in shown]
     ground, *pressed = (by_camera(each.astype(np.uint8), k) for k, each in enumerate(levels))
@@ -173,7 +173,7 @@ def errors_of(
     )
     guess = matched_exposure(layers.background.sum(axis=0), layers.chain, ground)
     start = np.zeros(len(chosen))
-    fit = LayeredFit(photographs, seen, layers, chosen, guess, start, {}, None, noise)
+    fit = LayeredFit(photographs, seen, layers, chosen, guess, start, {}, noise)
     found = fit.solve(start, np.zeros((len(seen), 3)))
     steps = found.steps
     fitted = designed(design, chosen, steps)

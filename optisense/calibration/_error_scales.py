@@ -169,15 +169,14 @@ class Scales:
 
         Args:
             errors: errors (h, w, 3) of the background and of each response, levels.
-            masks: (h, w) masks of the pixels of each response that count.
-            pixels: see `RoughFit`; None estimates it from the errors.
+            masks: masks (h, w) of the pixels of the background and of each response that count.
+            pixels: see `LayeredFit`.
         """
         ground, *pressed = (error / own for error, own in zip(errors, expected, strict=True))
-        everywhere = np.ones(ground.shape[:2], dtype=bool)
         return Scales(
             list(expected),
-            error_scale([ground], [everywhere], pixels),
-            error_scale(pressed, masks, pixels),
+            error_scale([ground], masks[:1], pixels),
+            error_scale(pressed, masks[1:], pixels),
         )
 
 

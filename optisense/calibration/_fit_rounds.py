@@ -16,7 +16,7 @@ from optisense.calibration._contact_placing import (
     scaled_contact,
 )
 from optisense.calibration._covered_view import CoveredView
-from optisense.calibration._gauss_newton import LayeredFit, RoughFit
+from optisense.calibration._gauss_newton import LayeredFit
 from optisense.calibration._layered_pictures import (
     LayeredPictures,
     PictureSlopes,
@@ -179,21 +179,21 @@ class FitRounds:
             noise: sample of the noise of the layers, if it is known.
             kept: indices of the numbers that are not changed.
         """
+        pixels = ROUGH_PIXELS if rough else None
         views = [number for number in self._rendering if self._chosen[number].views]
         contacts = np.zeros((len(seen), 3))
         if not views:
             fit = LayeredFit(
-                small, seen, layers, self._chosen, self.exposure, steps, slopes,
-                RoughFit(ROUGH_PIXELS) if rough else None, noise, kept,
-            )  # fmt: skip
+                small, seen, layers, self._chosen, self.exposure, steps, slopes, noise, kept, pixels
+            )
             return fit.solve(steps, contacts)
         rendered = self._view(small, steps)
         start, shown, view = steps.copy(), layers, rendered
         for blur in BLURS if rough else (0.0,) * VIEW_SOLVES:
             every = slopes | self._view_slopes(small, seen, start, shown, view)
             fit = LayeredFit(
-                small, seen, shown, self._chosen, self.exposure, start, every,
-                RoughFit(ROUGH_PIXELS, blur) if rough else None, noise, kept,
+                small, seen, shown, self._chosen, self.exposure, start, every, noise, kept, pixels,
+                blur,
             )  # fmt: skip
             found = fit.solve(steps, contacts)
             steps, contacts = found.steps, found.contacts
@@ -328,7 +328,7 @@ class FitRounds:
                     other = steps.copy()
                     other[index] = value
                     moved = self._layers(small, seen, other, number, same, more)
-                    ends.append([moved.background, *moved.presses])
+                    ends.append(moved.pictures)
                 quotients.append([(two - one) / size for one, two in zip(*ends, strict=True)])
             found[index] = PictureSlopes.of_two(*quotients)
         return found

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from copy import copy
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -90,21 +89,6 @@ ranges; the next round renders them anew.
 """
 
 
-@dataclass(frozen=True)
-class RoughFit:
-    """Comparison of pictures in a rough round.
-
-    Attributes:
-        pixels: number of pixels for which there is one independent error; otherwise it is estimated
-            from the errors.
-        blur: standard deviation, pixels, by which both pictures are blurred: details of blurred
-            pictures fit over larger displacements.
-    """
-
-    pixels: float
-    blur: float = 0.0
-
-
 class _Point(NamedTuple):
     """Steps of the numbers, changes of the contacts, and their pictures by `LayeredFit`."""
 
@@ -125,9 +109,10 @@ class LayeredFit:
         exposure: float,
         start: FloatArray,
         slopes: dict[int, PictureSlopes],
-        rough: RoughFit | None = None,
         noise: LayeredPictures | None = None,
         kept: Sequence[int] = (),
+        pixels: float | None = None,
+        blur: float = 0.0,
     ) -> None:
         """Prepare a round.
 
@@ -136,15 +121,17 @@ class LayeredFit:
             exposure: factor on the radiance.
             start: steps (n,) of the quantities at which the layers were rendered.
             slopes: slopes of quantities that need a rendering, by index.
-            rough: how pictures are compared in a rough round; None in the others.
             noise: errors of the layers by the noise of the light, a sample of them; None if they
                 are not known. Noisy slopes are then reduced to their true part.
             kept: indices of quantities that are not changed.
+            pixels: number of pixels for which there is one independent error in a rough round; None
+                estimates it from the errors.
+            blur: standard deviation, pixels, by which pictures are blurred: details of blurred
+                pictures fit over larger displacements.
         """
         self._noise = noise
         self._kept = list(kept)
-        self._pixels = None if rough is None else rough.pixels
-        self._blur = 0.0 if rough is None else rough.blur
+        self._pixels, self._blur = pixels, blur
         self._layers, self._chosen, self._exposure = layers, list(chosen), exposure
         self._start, self._slopes = start, slopes
         self._seen = seen
@@ -163,7 +150,7 @@ class LayeredFit:
             without_drift(self._compared(press.picture) - self._real, distance)
             for press, distance in zip(photographs.presses, away, strict=True)
         ]
-        self._masks = [distance <= NEAR for distance in away]
+        self._masks = [np.ones(shape, dtype=bool), *(distance <= NEAR for distance in away)]
         scale = shape[1] / 320.0
         self._contact_spread = np.array(CONTACT_SPREAD) * (scale, scale, 1.0)
         self._contact_slopes = [
@@ -188,7 +175,7 @@ class LayeredFit:
         """
         steps, contacts = self._reduced(steps, contacts)
         return [self._shown(-1, steps, None, noise)] + [
-            self._shown(index, steps, contacts[index], noise) for index in range(len(self._masks))
+            self._shown(index, steps, contacts[index], noise) for index in range(len(self._seen))
         ]
 
     def _reduced(self, steps: FloatArray, contacts: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -207,8 +194,9 @@ class LayeredFit:
         noise: LayeredPictures | None = None,
     ) -> FloatArray:
         """Return the levels of a press, or of the background (index -1), with added noise."""
-        layers = _picture(self._layers, index)
-        moved = layers if noise is None else layers + _picture(noise, index)
+        moved = self._layers.pictures[index + 1]
+        if noise is not None:
+            moved = moved + noise.pictures[index + 1]
         coverage = self._layers.coverage
         for number, slopes in self._slopes.items():
             off = float(np.clip(steps[number] - self._start[number], -TRUST, TRUST))
@@ -250,12 +238,15 @@ class LayeredFit:
             if self._scales(point).like(scales):
                 break
         spread = self._covariance(point, scales)
+        ground, *presses = (
+            self._root_mean_square(point.pictures, index) for index in range(-1, len(self._seen))
+        )
         return Solution(
             point.steps,
             point.contacts,
             spread[: self.count, : self.count],
-            self._errors(point.pictures),
-            self._press_errors(point.pictures),
+            (ground, float(np.sqrt(np.mean(np.square(presses))))),
+            np.array(presses),
         )
 
     def _point(self, steps: FloatArray, contacts: FloatArray) -> _Point:
@@ -280,7 +271,7 @@ class LayeredFit:
     def _half(self, noise: LayeredPictures) -> LayeredFit:
         """Return the fit to one of the two renderings whose mean this fit has."""
         half = copy(self)
-        half._layers = self._layers.with_noise(noise)
+        half._layers = self._layers.plus(noise.pictures)
         half._slopes = {number: each.half() for number, each in self._slopes.items()}
         half._contact_slopes = [
             contact_slopes(half._layers, index, place) for index, place in enumerate(self._seen)
@@ -328,29 +319,20 @@ class LayeredFit:
         stuck[self._kept] = True
         return np.concatenate([~stuck, np.ones(len(gradient) - self.count, dtype=bool)])
 
-    def _errors(self, pictures: list[FloatArray]) -> tuple[float, float]:
-        ground = float(np.sqrt(((pictures[0] - self._real) ** 2).mean()))
-        pressed = self._press_errors(pictures)
-        return ground, float(np.sqrt((pressed**2).mean()))
+    def _error(self, pictures: list[FloatArray], index: int) -> FloatArray:
+        """Return the error (h, w, 3) of the background (index -1), or of a press's response."""
+        if index < 0:
+            return pictures[0] - self._real
+        return pictures[index + 1] - pictures[0] - self._responses[index]
 
-    def _press_errors(self, pictures: list[FloatArray]) -> FloatArray:
-        return np.array(
-            [
-                np.sqrt(((shown - pictures[0] - real)[mask] ** 2).mean())
-                for shown, real, mask in zip(
-                    pictures[1:], self._responses, self._masks, strict=True
-                )
-            ]
-        )
+    def _root_mean_square(self, pictures: list[FloatArray], index: int) -> float:
+        """Return the root mean square of the error of the background or near a contact, levels."""
+        return float(np.sqrt((self._error(pictures, index)[self._masks[index + 1]] ** 2).mean()))
 
     def _scales(self, point: _Point) -> Scales:
         """Return the sizes of the errors, unaffected by dust."""
-        pictures = point.pictures
-        expected = expected_errors(pictures[0], self._noise_of(point), self._outline)
-        errors = [pictures[0] - self._real] + [
-            shown - pictures[0] - real
-            for shown, real in zip(pictures[1:], self._responses, strict=True)
-        ]
+        expected = expected_errors(point.pictures[0], self._noise_of(point), self._outline)
+        errors = [self._error(point.pictures, index) for index in range(-1, len(self._seen))]
         return Scales.of_errors(errors, expected, self._masks, self._pixels)
 
     def _noise_of(self, point: _Point) -> list[FloatArray]:
@@ -367,15 +349,12 @@ class LayeredFit:
     def _residuals(self, pictures: list[FloatArray], index: int, scales: Scales) -> FloatArray:
         """Return the residuals (k, 3) of the background (index -1), or those near a contact."""
         size = scales.of(index).size * scales.expected[index + 1]
-        if index < 0:
-            return np.asarray(((pictures[0] - self._real) / size).reshape(-1, 3))
-        error = pictures[index + 1] - pictures[0] - self._responses[index]
-        mask = self._masks[index]
-        return np.asarray(error[mask] / size[mask])
+        mask = self._masks[index + 1]
+        return np.asarray(self._error(pictures, index)[mask] / size[mask])
 
     def _cost(self, point: _Point, scales: Scales) -> float:
         total = float((self._prior(point) ** 2).sum())
-        for index in range(-1, len(self._masks)):
+        for index in range(-1, len(self._seen)):
             size = np.abs(self._residuals(point.pictures, index, scales))
             loss = np.where(size < HUBER, size**2, HUBER * (2.0 * size - HUBER))
             total += float(loss.sum()) / scales.of(index).pixels
@@ -383,7 +362,7 @@ class LayeredFit:
 
     def _normal(self, point: _Point, scales: Scales) -> tuple[FloatArray, FloatArray]:
         """Return matrix and gradient of the normal equations."""
-        size, whole = self.count + 3 * len(self._masks), np.zeros(self._real.shape[:2], np.int64)
+        size, whole = self.count + 3 * len(self._seen), np.zeros(self._real.shape[:2], np.int64)
         (matrix,), (gradient,) = normal_equations(self._linear(point, scales), size, whole)
         return matrix + np.eye(size), gradient + self._prior(point)
 
@@ -395,9 +374,8 @@ class LayeredFit:
         """Yield the linear equations of the background and of each press."""
         steps, contacts, pictures = point
         n = self.count
-        masks = [np.ones(self._real.shape[:2], dtype=bool), *self._masks]
         moved = [self._moved(steps, contacts, k) for k in range(n)]
-        for index in range(-1, len(self._masks)):
+        for index in range(-1, len(self._seen)):
             residual = self._residuals(pictures, index, scales)
             unknowns = list(range(n))
             if not unknowns and index < 0:
@@ -411,14 +389,14 @@ class LayeredFit:
                 ]
             weight = np.minimum(1.0, HUBER / np.maximum(np.abs(residual), 1e-12))
             weight /= scales.of(index).pixels
-            yield unknowns, np.stack(slopes, axis=-1), weight, residual, masks[index + 1]
+            yield unknowns, np.stack(slopes, axis=-1), weight, residual, self._masks[index + 1]
 
     def _covariance(self, point: _Point, scales: Scales) -> FloatArray:
         """Return the covariance of the unknowns, from the errors of blocks of the pictures."""
         height, width = self._real.shape[:2]
         rows, columns = (BLOCKS * np.mgrid[:height, :width] / width).astype(np.int64)
         blocks = BLOCKS * rows + columns
-        size = self.count + 3 * len(self._masks)
+        size = self.count + 3 * len(self._seen)
         return jackknife_covariance(*normal_equations(self._linear(point, scales), size, blocks))
 
     def _moved(
@@ -440,8 +418,3 @@ class LayeredFit:
             changed[index + 1] = self._shown(index, steps, other)
             found.append(changed)
         return found
-
-
-def _picture(layers: LayeredPictures, index: int) -> NDArray[np.float32]:
-    """Return the layers (groups, h, w, 3) of a press, or of the background (index -1)."""
-    return layers.background if index < 0 else layers.presses[index]

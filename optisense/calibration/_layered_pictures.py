@@ -38,8 +38,7 @@ class LayeredPictures:
 
     Attributes:
         groups: names of the light groups.
-        background: radiance (groups, h, w, 3).
-        presses: radiance of each press, (groups, h, w, 3).
+        pictures: radiance (groups, h, w, 3) of the background and of each press.
         chain: picture chain of the model's camera, without noise.
         contacts: contacts that were pressed in.
         coverage: share (h, w) of each pixel that sees skin, if the photographs are averages of the
@@ -47,20 +46,20 @@ class LayeredPictures:
     """
 
     groups: tuple[str, ...]
-    background: FloatArray = field(repr=False)
-    presses: tuple[FloatArray, ...] = field(repr=False)
+    pictures: tuple[FloatArray, ...] = field(repr=False)
     chain: PictureChain
     contacts: tuple[Contact, ...]
     coverage: NDArray[np.float64] | None = field(default=None, repr=False)
 
-    def with_noise(self, noise: LayeredPictures) -> LayeredPictures:
-        """Return the layers with others added to them, which are a sample of their noise."""
-        presses = zip(self.presses, noise.presses, strict=True)
-        return replace(
-            self,
-            background=self.background + noise.background,
-            presses=tuple(one + two for one, two in presses),
-        )
+    @property
+    def background(self) -> FloatArray:
+        """Radiance (groups, h, w, 3) with nothing pressed in."""
+        return self.pictures[0]
+
+    def plus(self, changes: Sequence[FloatArray]) -> LayeredPictures:
+        """Return the layers with a change (groups, h, w, 3) of each picture."""
+        pairs = zip(self.pictures, changes, strict=True)
+        return replace(self, pictures=tuple(one + change for one, change in pairs))
 
 
 @dataclass(frozen=True)
@@ -132,8 +131,8 @@ def layered_pictures(
         )
         pictures.append(with_smooth_outline(np.stack(list(layers.values())), view.coverage))
     return LayeredPictures(
-        tuple(model.design.lights), pictures[0], tuple(pictures[1:]),
-        model.picture_chain.without_noise(), tuple(contacts),
+        tuple(model.design.lights), tuple(pictures), model.picture_chain.without_noise(),
+        tuple(contacts),
         view.coverage if photographs.scale < 1.0 else None,
     )  # fmt: skip
 
@@ -158,22 +157,16 @@ def averaged(
     is a sample of the noise of the mean.
     """
     half = np.float32(0.5)
-    pairs = list(
-        zip((one.background, *one.presses), (other.background, *other.presses), strict=True)
-    )
-    mean = [half * (a + b) for a, b in pairs]
-    noise = [half * (a - b) for a, b in pairs]
-    return (
-        replace(one, background=mean[0], presses=tuple(mean[1:])),
-        replace(one, background=noise[0], presses=tuple(noise[1:])),
-    )
+    pairs = list(zip(one.pictures, other.pictures, strict=True))
+    mean = replace(one, pictures=tuple(half * (a + b) for a, b in pairs))
+    return mean, replace(one, pictures=tuple(half * (a - b) for a, b in pairs))
 
 
 def contact_slopes(layers: LayeredPictures, index: int, seen: SeenContact) -> FloatArray:
     """Return the derivatives of a press by its column and row, in pixels, and by the logarithm of
     its radius, (3, groups, h, w, 3).
     """
-    response = layers.presses[index] - layers.background
+    response = layers.pictures[index + 1] - layers.background
     down, across = np.gradient(response, axis=(1, 2))
     rows, columns = np.mgrid[: response.shape[1], : response.shape[2]] + 0.5
     x = (columns - seen.centre[0]).astype(np.float32)[..., None]

@@ -66,7 +66,7 @@ def view_changes(
         ground[:, outline.where] = more * outline.contrast(layers.background)
     scales = [_pixel_sizes(view.rays) for view in (before, after)]
     found = [ground]
-    for picture, place in zip(layers.presses, seen, strict=True):
+    for picture, place in zip(layers.pictures[1:], seen, strict=True):
         row, column = int(place.centre[1]), int(place.centre[0])
         one, other = (float(scale[row, column]) for scale in scales)
         growth = other / one - 1.0 if np.isfinite(one + other) and one > 0.0 else 0.0
@@ -81,13 +81,8 @@ def with_view(
     after: CoveredView,
 ) -> LayeredPictures:
     """Return layers after a change of the view, see `view_changes`."""
-    ground, *presses = view_changes(layers, seen, before, after)
-    return replace(
-        layers,
-        background=layers.background + ground,
-        presses=tuple(one + two for one, two in zip(layers.presses, presses, strict=True)),
-        coverage=None if layers.coverage is None else after.coverage,
-    )
+    moved = layers.plus(view_changes(layers, seen, before, after))
+    return replace(moved, coverage=None if layers.coverage is None else after.coverage)
 
 
 def displacements(before: ChiefRays, after: ChiefRays) -> tuple[FloatArray, FloatArray]:

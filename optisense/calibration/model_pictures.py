@@ -70,7 +70,7 @@ def model_pictures(
     """
     check_shape(photographs, model)
     layers = layered_pictures(model, photographs, seen, photons, seed, kept=kept, progress=progress)
-    background, *presses = (each.sum(axis=0) for each in (layers.background, *layers.presses))
+    background, *presses = (each.sum(axis=0) for each in layers.pictures)
     if exposure is None:
         exposure = matched_exposure(background, layers.chain, photographs.background)
     pictures = [levels_of(each, layers.chain, exposure) for each in (background, *presses)]

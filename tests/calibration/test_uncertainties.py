@@ -60,11 +60,7 @@ def test_dark_places_mislead_no_fit_that_knows_the_noise_of_the_light(
         white = rng.standard_normal(shape)
         smooth = gaussian_filter(white, (0.0, 4.0, 4.0, 0.0))
         factor = (1.0 + LIGHT_NOISE * smooth / smooth.std()).astype(np.float32)
-        return replace(
-            layers,
-            background=factor * layers.background,
-            presses=tuple(factor * each for each in layers.presses),
-        )
+        return replace(layers, pictures=tuple(factor * each for each in layers.pictures))
 
     chosen = quantities_of(ots.load("gelsight-mini-ideal"), ("colours", "tone", "black"))
     truth = np.array([-0.8, 0.3, 1.0, -0.2, -0.8, 0.9, 0.4, 0.6, 0.4, 0.9])
@@ -83,7 +79,7 @@ def test_dark_places_mislead_no_fit_that_knows_the_noise_of_the_light(
         mean, noise = averaged(noisy(rng), noisy(rng))
         start = truth + 0.15 * rng.standard_normal(len(truth))
         for known, each in zip((None, noise), errors, strict=True):
-            fit = LayeredFit(real, seen, mean, chosen, 250.0, start, {}, None, known)
+            fit = LayeredFit(real, seen, mean, chosen, 250.0, start, {}, known)
             found = fit.solve(start, still)
             each.append(found.steps - truth)
         deviations = np.sqrt(np.diag(found.covariance))
@@ -102,7 +98,7 @@ def test_noise_of_slopes_is_no_information(
         ots.load("gelsight-mini-ideal"), ("powers",), [("coating.specularity", 0.0, 0.4)]
     )
     still, start, off = np.zeros((len(seen), 3)), np.zeros(4), 1.5
-    pictures = [layers.background, *layers.presses]
+    pictures = layers.pictures
     rows, columns = np.mgrid[: pictures[0].shape[1], : pictures[0].shape[2]] / 20.0
     pattern = 0.02 * (np.sin(rows) * np.cos(columns))[..., None]
     true = [(pattern * each).astype(np.float32) for each in pictures]
@@ -112,14 +108,7 @@ def test_noise_of_slopes_is_no_information(
             (size * each * rng.standard_normal(each.shape)).astype(np.float32) for each in pictures
         ]
 
-    moved = replace(
-        layers,
-        background=layers.background + np.float32(off) * true[0],
-        presses=tuple(
-            each + np.float32(off) * slope
-            for each, slope in zip(layers.presses, true[1:], strict=True)
-        ),
-    )
+    moved = layers.plus([np.float32(off) * slope for slope in true])
     made = LayeredFit(photographs, seen, moved, chosen, 250.0, start, {})
     levels = [
         np.clip(np.round(each + rng.standard_normal(each.shape)), 0, 255).astype(np.uint8)
@@ -141,7 +130,7 @@ def test_noise_of_slopes_is_no_information(
             for _ in range(2)
         ]
         slopes = {3: PictureSlopes.of_two(*two)}
-        fit = LayeredFit(real, seen, mean, chosen, 250.0, start, slopes, None, noise)
+        fit = LayeredFit(real, seen, mean, chosen, 250.0, start, slopes, noise)
         solution = fit.solve(start, still)
         found.append((solution.steps[3], np.sqrt(solution.covariance[3, 3])))
     (step, deviation), (_, unknown) = found

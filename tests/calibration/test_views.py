@@ -82,7 +82,7 @@ def test_distortion_moves_the_corners_of_a_picture_and_not_its_middle(mini: Opti
 def test_responses_grow_with_the_skin_that_a_pixel_sees(mini: OpticalModel) -> None:
     before, after = (CoveredView.of(each, SIZE) for each in (mini, seen_from((0.06, 0.0, 0.0))))
     ground = np.ones((1, SIZE[1], SIZE[0], 3), np.float32)
-    layers = LayeredPictures(("white",), ground, (ground + 0.5,), mini.picture_chain, ())
+    layers = LayeredPictures(("white",), (ground, ground + 0.5), mini.picture_chain, ())
     found = view_changes(layers, [SeenContact((80.0, 60.0), 10.0)], before, after)
     assert np.abs(found[0]).max() < 1e-6  # an even background looks the same from anywhere
     wider = np.ptp(after.rays.points[60, :, 0]) / np.ptp(before.rays.points[60, :, 0])
@@ -102,7 +102,7 @@ def test_a_displacement_does_not_average_the_noise_of_layers(mini: OpticalModel)
     for picture in (slope, slope + noise):
         ground = np.repeat(picture[None, ..., None], 3, axis=-1)
         changes += view_changes(
-            LayeredPictures(("white",), ground, (), chain, ()), [], before, after
+            LayeredPictures(("white",), (ground,), chain, ()), [], before, after
         )
     clean, noisy = (change[0, ..., 0] for change in changes)
     assert clean[:, 20:-20].mean() == pytest.approx(1.5, rel=0.1)
@@ -137,7 +137,7 @@ def test_the_outline_of_the_skin_moves_by_fractions_of_a_pixel() -> None:
     assert set(np.unique(white)) == {0.0, 1.0}
     smooth = with_smooth_outline(np.repeat(white, 3, axis=-1), before.coverage)
     assert smooth[0, ..., 0] == pytest.approx(before.coverage, abs=1e-6)
-    layers = LayeredPictures(("white",), smooth, (), ots.OpticalModel(design).picture_chain, ())
+    layers = LayeredPictures(("white",), (smooth,), ots.OpticalModel(design).picture_chain, ())
     (change,) = view_changes(layers, [], before, after)
     outline = (before.coverage > 0.0) & (before.coverage < 1.0)
     shown = np.abs(change[0, ..., 0][outline]) > 0.01
