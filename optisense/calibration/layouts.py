@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -83,8 +84,7 @@ def _read_own(folder: Path, diameter: float | None) -> Photographs:
     table = folder / PRESSES
     background, fingerprint = _background(folder)
     presses = []
-    for number, row in enumerate(_rows(table), start=2):
-        where = f"{table}:{number}"
+    for where, row in _rows(table):
         name = _text(row, "file", where)
         picture, own = _picture(folder, name, where)
         presses.append(
@@ -104,18 +104,12 @@ def _read_gs_sdk(folder: Path, diameter: float | None) -> Photographs:
     table = folder / CATALOG
     background, fingerprint = _background(folder)
     presses = []
-    for number, row in enumerate(_rows(table), start=2):
-        where = f"{table}:{number}"
+    for where, row in _rows(table):
         name = _text(row, "experiment_reldir", where)
         picture, own = _picture(folder, f"{name}/{EXPERIMENT}", where)
-        given = _number(row, "diameter(mm)", where) or diameter
-        if given is None:
-            raise _no_diameter(where)
+        given = _stated(_number(row, "diameter(mm)", where), diameter, where)
         label = inside(folder, f"{name}/{LABEL}")
-        centre = radius = None
-        if label is not None and is_file(label):
-            arrays = read_arrays(label, CalibrationError)
-            centre, radius = _label(arrays, label)
+        centre, radius = (None, None) if label is None or not is_file(label) else _label(label)
         presses.append(PhotographedPress(name, picture, given, centre, radius, own))
     return Photographs(background, tuple(presses), "gs_sdk", fingerprint)
 
@@ -145,8 +139,7 @@ def _read_taxim(folder: Path, diameter: float | None) -> Photographs:
         picture = np.ascontiguousarray(pictures[index][..., ::-1])
         centre = radius = None
         if centres is not None and radii is not None:
-            x, y = (float(value) + MIDDLE for value in centres[index])
-            centre, radius = _place(x, y, path), _length(float(radii[index]), str(path))
+            centre, radius = _contact(centres[index], radii[index], path)
         presses.append(
             PhotographedPress(
                 f"press {index + 1}", picture, diameter, centre, radius, _fingerprint(picture)
@@ -171,8 +164,7 @@ def _background(folder: Path) -> tuple[ByteArray, str]:
             where=str(folder),
             hint="Add a photograph with nothing pressed in; all presses are read against it",
         )
-    data = read_bytes(path, MOST_PICTURE, CalibrationError, "the background")
-    return decode_picture(data, path, CalibrationError), hashlib.sha256(data).hexdigest()
+    return _decoded(path, "the background")
 
 
 def _picture(folder: Path, name: str, where: str) -> tuple[ByteArray, str]:
@@ -187,11 +179,17 @@ def _picture(folder: Path, name: str, where: str) -> tuple[ByteArray, str]:
         raise CalibrationError(
             f"there is no photograph '{brief(name)}'", where=where, hint="Check its name"
         )
-    data = read_bytes(path, MOST_PICTURE, CalibrationError, "the photograph")
+    return _decoded(path, "the photograph")
+
+
+def _decoded(path: Path, what: str) -> tuple[ByteArray, str]:
+    """Return a picture, and the SHA-256 of its file."""
+    data = read_bytes(path, MOST_PICTURE, CalibrationError, what)
     return decode_picture(data, path, CalibrationError), hashlib.sha256(data).hexdigest()
 
 
-def _rows(path: Path) -> list[dict[str, str]]:
+def _rows(path: Path) -> list[tuple[str, Mapping[str, str]]]:
+    """Return the rows of a table, each with the place of its line."""
     rows = read_table(path, CalibrationError, by_hand=True)
     if not rows:
         raise CalibrationError(
@@ -203,49 +201,45 @@ def _rows(path: Path) -> list[dict[str, str]]:
             where=str(path),
             hint="Leave some out: six determine a sensor",
         )
-    return rows
+    return [(f"{path}:{number}", row) for number, row in enumerate(rows, start=2)]
 
 
-def _text(row: Mapping[str, Any], column: str, where: str) -> str:
-    value = row.get(column)
-    if not isinstance(value, str) or not value.strip():
+def _cell(row: Mapping[str, str], column: str) -> str:
+    """Return the text in a column, empty if the column is missing."""
+    return (row.get(column) or "").strip()
+
+
+def _text(row: Mapping[str, str], column: str, where: str) -> str:
+    value = _cell(row, column)
+    if not value:
         raise CalibrationError(
             f"the column '{column}' is missing or empty",
             where=where,
             hint="The first line of the table names its columns",
         )
-    return value.strip()
+    return value
 
 
-def _number(row: Mapping[str, Any], column: str, where: str) -> float | None:
+def _number(row: Mapping[str, str], column: str, where: str) -> float | None:
     """Return the number in a column, or None if the column is missing or empty."""
-    value = row.get(column)
-    if not isinstance(value, str) or not value.strip():
+    text = _cell(row, column)
+    if not text:
         return None
     try:
-        return _length(float(value), where, column)
+        return _length(float(text), where, column)
     except ValueError:
-        if _is_number(pointed := value.strip().replace(",", ".")):
-            raise CalibrationError(
-                f"'{brief(value)}' under '{column}' has a decimal comma",
-                where=where,
-                hint=f"Write it with a point: {pointed}",
-            ) from None
+        has_comma = re.fullmatch(r"[+-]?\d*,\d+", text) is not None
         raise CalibrationError(
-            f"'{brief(value)}' under '{column}' is no number",
+            f"'{brief(text)}' under '{column}' "
+            + ("has a decimal comma" if has_comma else "is no number"),
             where=where,
-            hint="Correct the table",
+            hint=f"Write it with a point: {text.replace(',', '.')}"
+            if has_comma
+            else "Correct the table",
         ) from None
 
 
-def _is_number(text: str) -> bool:
-    try:
-        return math.isfinite(float(text))
-    except ValueError:
-        return False
-
-
-def _centre(row: Mapping[str, Any], where: str) -> tuple[float, float] | None:
+def _centre(row: Mapping[str, str], where: str) -> tuple[float, float] | None:
     column, line = _number(row, "column", where), _number(row, "row", where)
     if (column is None) != (line is None):
         raise CalibrationError(
@@ -256,15 +250,12 @@ def _centre(row: Mapping[str, Any], where: str) -> tuple[float, float] | None:
     return None if column is None or line is None else (column, line)
 
 
-def _ball(row: Mapping[str, Any], where: str, usual: float | None) -> float:
+def _ball(row: Mapping[str, str], where: str, usual: float | None) -> float:
     """Return the diameter of the ball of a row, mm."""
     given = _number(row, "diameter", where)
-    text = (row.get("indenter") or "").strip()
+    text = _cell(row, "indenter")
     if not text:
-        found = usual if given is None else given
-        if found is None:
-            raise _no_diameter(where)
-        return found
+        return _stated(given, usual, where)
     try:
         indenter = parse_indenter(text)
     except ContactError as error:
@@ -285,33 +276,26 @@ def _ball(row: Mapping[str, Any], where: str, usual: float | None) -> float:
     return found
 
 
-def _no_diameter(where: str) -> CalibrationError:
-    return CalibrationError(
-        "the ball's diameter is missing",
-        where=where,
-        hint="Add a column 'diameter', in mm, or give --ball",
-    )
+def _stated(given: float | None, usual: float | None, where: str) -> float:
+    """Return the diameter that a row states, mm, or else the one for all rows."""
+    found = usual if given is None else given
+    if found is None:
+        raise CalibrationError(
+            "the ball's diameter is missing",
+            where=where,
+            hint="Add a column 'diameter', in mm, or give --ball",
+        )
+    return found
 
 
-def _label(
-    arrays: Mapping[str, NDArray[Any]], path: Path
-) -> tuple[tuple[float, float] | None, float | None]:
-    if "center" not in arrays or "radius" not in arrays:
+def _label(path: Path) -> tuple[tuple[float, float], float]:
+    """Return column and row of a contact, and its radius, pixels, from a label of gs_sdk."""
+    arrays = read_arrays(path, CalibrationError)
+    centre, radius = (arrays.get(name, np.zeros(0)).ravel() for name in ("center", "radius"))
+    kinds = {centre.dtype.kind, radius.dtype.kind}
+    if centre.shape != (2,) or radius.shape != (1,) or not kinds <= set("fiu"):
         raise _odd(path, "center and radius")
-    centre, radius = (np.asarray(arrays[name]).ravel() for name in ("center", "radius"))
-    if (
-        centre.shape != (2,)
-        or radius.shape != (1,)
-        or {centre.dtype.kind, radius.dtype.kind}
-        - {
-            "f",
-            "i",
-            "u",
-        }
-    ):
-        raise _odd(path, "center and radius")
-    x, y = float(centre[0]) + MIDDLE, float(centre[1]) + MIDDLE
-    return _place(x, y, path), _length(float(radius[0]), str(path))
+    return _contact(centre, radius[0], path)
 
 
 def _array(
@@ -331,8 +315,10 @@ def _odd(path: Path, names: str) -> CalibrationError:
     )
 
 
-def _place(x: float, y: float, path: Path) -> tuple[float, float]:
-    return _length(x, str(path)), _length(y, str(path))
+def _contact(pixel: NDArray[Any], radius: float, path: Path) -> tuple[tuple[float, float], float]:
+    """Return the position from the picture's edge, and the radius, of another tool's label."""
+    x, y = (_length(float(value) + MIDDLE, str(path)) for value in pixel)
+    return (x, y), _length(float(radius), str(path))
 
 
 def _length(value: float, where: str, what: str = "a place or radius") -> float:
