@@ -63,17 +63,11 @@ class ContactFinder:
         self._background, self._presses = photographs.background, photographs.presses
         self._found: dict[tuple[object, ...], FoundContact | None] = {}
 
-    def _strongest(self, press: PhotographedPress) -> FoundContact | None:
-        """Return the contact with the strongest response in a photograph."""
-        return self._contact(press, None, None)
-
-    def _at_label(self, press: PhotographedPress) -> FoundContact | None:
-        """Return the contact near the label of a photograph; the strongest if it has none."""
-        return self._contact(press, press.centre, press.radius)
-
-    def _contact(
-        self, press: PhotographedPress, near: tuple[float, float] | None, radius: float | None
-    ) -> FoundContact | None:
+    def _contact(self, press: PhotographedPress, labelled: bool = False) -> FoundContact | None:
+        """Return the contact with the strongest response in a photograph, or that near its label,
+        if it has one.
+        """
+        near, radius = (press.centre, press.radius) if labelled else (None, None)
         key = id(press), near, radius
         if key not in self._found:
             self._found[key] = find_contact(press.picture, self._background, near, radius)
@@ -98,9 +92,9 @@ class ContactFinder:
             if centre is not None and radius is not None and not refine:
                 found.append(SeenContact(centre, radius))
                 continue
-            seen = self._at_label(press)
+            seen = self._contact(press, labelled=True)
             if centre is not None and seen is not None and seen.asymmetry > DOUBTFUL:
-                free = self._strongest(press)
+                free = self._contact(press)
                 looks_right = free is not None and free.asymmetry < DOUBTFUL
                 if free is not None and looks_right and not self._is_blemish(press, free):
                     seen = free
@@ -118,7 +112,7 @@ class ContactFinder:
         for other in self._presses:
             if other is press or other.centre is None:
                 continue
-            seen = self._strongest(other)
+            seen = self._contact(other)
             if seen is None:
                 continue
             size = max(seen.radius, found.radius)
@@ -128,24 +122,23 @@ class ContactFinder:
 
     def doubts(self) -> list[str]:
         """Return warnings about presses: no visible contact, or labels that contradict it."""
-        found = []
-        twice = 0
+        found: list[str] = []
         denied: list[FoundContact] = []
         every: list[FoundContact] = []
+        twice = 0
         for press in self._presses:
-            seen = free = self._strongest(press)
+            seen = free = self._contact(press)
             if press.centre is not None:
-                labelled = self._at_label(press)
+                labelled = self._contact(press, labelled=True)
                 if labelled is not None and labelled.asymmetry < DOUBTFUL:
                     seen = labelled
-            if seen is not None:
-                wide = replace(seen, radius=max(seen.radius, press.radius or 0.0))
-                other = find_another(press.picture, self._background, wide)
-                twice += other is not None and other.asymmetry < DOUBTFUL
             if seen is None:
                 found.append(f"{press.name}: it shows no contact and is left out")
                 continue
             every.append(seen)
+            wide = replace(seen, radius=max(seen.radius, press.radius or 0.0))
+            other = find_another(press.picture, self._background, wide)
+            twice += other is not None and other.asymmetry < DOUBTFUL
             if seen.asymmetry > DOUBTFUL:
                 found.append(
                     f"{press.name}: its difference from the background does not look like the "
