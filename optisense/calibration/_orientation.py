@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 
-from optisense.array_types import FloatArray
 from optisense.calibration.model_pictures import ModelPictures
 from optisense.calibration.photographs import Photographs
-from optisense.calibration.realism import PATCH
+from optisense.calibration.realism import PATCH, correlation
 from optisense.calibration.seen_contacts import SeenContact
 
 HALF_TURN = "turned by 180 degrees"
@@ -81,8 +79,8 @@ def _likenesses(
     for placing, (down, across) in PLACINGS.items():
         for colours, step in (("", 1), (EXCHANGED, -1)):
             change = np.s_[::down, ::across, ::step]
-            of_ground = _correlation(ground[change], pictures.background)
-            of_responses = np.median([_correlation(one[change], two) for one, two in responses])
+            of_ground = correlation(ground[change], pictures.background)
+            of_responses = np.median([correlation(one[change], two) for one, two in responses])
             words = " and ".join(word for word in (placing, colours) if word)
             found[words] = 0.5 * (of_ground + float(of_responses))
     return found
@@ -96,9 +94,3 @@ def _box(seen: SeenContact, size: tuple[int, int]) -> tuple[slice, slice]:
         for reach in [max(min(PATCH * seen.radius, middle, length - middle), 1.0)]
     )
     return rows, columns
-
-
-def _correlation(one: FloatArray, other: FloatArray) -> float:
-    """Return the correlation of two pictures over all pixels and channels."""
-    one, other = one - one.mean(), other - other.mean()
-    return float((one * other).sum() / max(math.sqrt((one**2).sum() * (other**2).sum()), 1e-12))

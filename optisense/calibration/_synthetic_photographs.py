@@ -54,12 +54,11 @@ def photograph_model(
         CalibrationError: an indenter is not a ball.
         OptiSenseError: the model can't be rendered.
     """
-    for contact in contacts:
-        if not isinstance(contact.indenter, Sphere):
-            raise CalibrationError(
-                "only contacts of balls can be photographed for a calibration",
-                hint="Press a Sphere",
-            )
+    balls = [each.indenter for each in contacts if isinstance(each.indenter, Sphere)]
+    if len(balls) < len(contacts):
+        raise CalibrationError(
+            "only contacts of balls can be photographed for a calibration", hint="Press a Sphere"
+        )
     blank = model.render(resolution=resolution, photons=photons, seed=seed, partial=False)
     factor = blank.auto_exposure() if exposure is None else exposure
     rng = np.random.default_rng([seed, 17])
@@ -69,18 +68,12 @@ def photograph_model(
         return np.clip(np.round(levels), 0, 255).astype(np.uint8)
 
     presses = []
-    for number, contact in enumerate(contacts, start=1):
+    for number, (contact, ball) in enumerate(zip(contacts, balls, strict=True), start=1):
         image = model.render(
             [contact], resolution=resolution, photons=photons, seed=seed, partial=False
         )
-        assert isinstance(contact.indenter, Sphere)
-        presses.append(
-            PhotographedPress(
-                f"press-{number:02}.png",
-                noisy(image.picture(factor)),
-                2.0 * contact.indenter.radius,
-            )
-        )
+        picture = noisy(image.picture(factor))
+        presses.append(PhotographedPress(f"press-{number:02}.png", picture, 2.0 * ball.radius))
     return Photographs(noisy(blank.picture(factor)), tuple(presses))
 
 

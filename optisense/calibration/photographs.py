@@ -141,7 +141,9 @@ class Photographs:
             replace(
                 press,
                 picture=_resized(press.picture, size),
-                centre=None if press.centre is None else _times(press.centre, factor),
+                centre=None
+                if press.centre is None
+                else (factor * press.centre[0], factor * press.centre[1]),
                 radius=None if press.radius is None else factor * press.radius,
             )
             for press in self.presses
@@ -202,7 +204,3 @@ def _is_grey(picture: ByteArray) -> bool:
 
 def _resized(picture: ByteArray, size: tuple[int, int]) -> ByteArray:
     return np.asarray(Image.fromarray(picture).resize(size, Image.Resampling.BOX), dtype=np.uint8)
-
-
-def _times(place: tuple[float, float], factor: float) -> tuple[float, float]:
-    return place[0] * factor, place[1] * factor

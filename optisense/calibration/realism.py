@@ -10,7 +10,7 @@ the bare background reaches 0.975 there.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -221,52 +221,51 @@ def _press(name: str, real: FloatArray, model: FloatArray, seen: SeenContact) ->
     drifted = drift(real, distance)
     far_smooth = without_noise(model - real, distance > FAR)
     real = real - drifted
-    contact = distance <= 1.0
-    ring = (distance >= RING[0]) & (distance <= RING[1])
-    patch = distance <= PATCH
-    far = distance > FAR
+    regions = {
+        "contact": distance <= 1.0,
+        "ring": (distance >= RING[0]) & (distance <= RING[1]),
+        "patch": distance <= PATCH,
+    }
+    contact, patch, far = regions["contact"], regions["patch"], distance > FAR
     error = model - real
+    # Ratio of the energies of error and response in each region.
+    shares = {
+        name: _square(error[where]) / max(_square(real[where]), 1e-12)
+        for name, where in regions.items()
+    }
+    window, noise = SIMILARITY_WINDOW * seen.radius, math.sqrt(_square(real[far]))
     turns, gains = zip(
         *(_brightening(real, model, c, seen, contact) for c in range(3)), strict=True
     )
     return PressRealism(
         name=name,
-        unexplained=_square(error[patch]) / max(_square(real[patch]), 1e-12),
-        contact=math.sqrt(_square(error[contact]) / max(_square(real[contact]), 1e-12)),
-        ring=math.sqrt(_square(error[ring]) / max(_square(real[ring]), 1e-12)),
+        unexplained=shares["patch"],
+        contact=math.sqrt(shares["contact"]),
+        ring=math.sqrt(shares["ring"]),
         strength=math.sqrt(_square(real[contact])),
         far=math.sqrt(_square(error[far])),
-        far_real=math.sqrt(_square(real[far])),
+        far_real=noise,
         far_smooth=far_smooth,
         drift=_each(drifted.tolist()),
-        similarity=float(similarity(real, model, SIMILARITY_WINDOW * seen.radius)[patch].mean()),
+        similarity=float(similarity(real, model, window)[patch].mean()),
         turn=turns,
         gain=gains,
-        noise=_noise_figures(real, seen, math.sqrt(_square(real[far]))),
+        noise=_noise_figures(real, regions, window, noise),
     )
 
 
-def _noise_figures(real: FloatArray, seen: SeenContact, noise: float) -> NoiseFigures:
-    """Return the figures of a model without errors.
-
-    Args:
-        real: real response (h, w, 3).
-        noise: standard deviation of the noise of the response, levels.
-    """
-    distance = distances(real.shape[:2], seen)
-
-    def share(where: NDArray[np.bool_]) -> float:
-        return noise**2 / max(_square(real[where]), 1e-12)
-
-    window = SIMILARITY_WINDOW * seen.radius
+def _noise_figures(
+    real: FloatArray, regions: Mapping[str, NDArray[np.bool_]], window: float, noise: float
+) -> NoiseFigures:
+    """Return the figures of a model without errors, for noise of a standard deviation in levels."""
+    shares = {name: noise**2 / max(_square(real[where]), 1e-12) for name, where in regions.items()}
     smooth = np.asarray(gaussian_filter(real, (0.5 * window, 0.5 * window, 0.0)))
     noisy = smooth + noise * np.random.default_rng(NOISE_SEED).standard_normal(real.shape)
-    patch = distance <= PATCH
     return NoiseFigures(
-        unexplained=share(patch),
-        contact=math.sqrt(share(distance <= 1.0)),
-        ring=math.sqrt(share((distance >= RING[0]) & (distance <= RING[1]))),
-        similarity=float(similarity(noisy, smooth, window)[patch].mean()),
+        unexplained=shares["patch"],
+        contact=math.sqrt(shares["contact"]),
+        ring=math.sqrt(shares["ring"]),
+        similarity=float(similarity(noisy, smooth, window)[regions["patch"]].mean()),
     )
 
 
@@ -320,7 +319,7 @@ def similarity(one: FloatArray, other: FloatArray, window: float) -> FloatArray:
 def _background(real: FloatArray, model: FloatArray) -> BackgroundRealism:
     error = _square(model - real)
     return BackgroundRealism(
-        correlation=_each([_correlation(real[..., c], model[..., c]) for c in range(3)]),
+        correlation=_each([correlation(real[..., c], model[..., c]) for c in range(3)]),
         real=_each([float(real[..., c].mean()) for c in range(3)]),
         model=_each([float(model[..., c].mean()) for c in range(3)]),
         error=_each([math.sqrt(_square(model[..., c] - real[..., c])) for c in range(3)]),
@@ -328,7 +327,8 @@ def _background(real: FloatArray, model: FloatArray) -> BackgroundRealism:
     )
 
 
-def _correlation(one: FloatArray, other: FloatArray) -> float:
+def correlation(one: FloatArray, other: FloatArray) -> float:
+    """Return the correlation of two pictures over all pixels; 0 if one of them is uniform."""
     spread = float(one.std() * other.std())
     if spread < 1e-9:
         return 0.0
