@@ -10,11 +10,7 @@ from typing import TYPE_CHECKING
 from optisense.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
-    from optisense.tasks._ball_force import BallForce
-    from optisense.tasks._ball_shear import BallShear
     from optisense.tasks._calibration import CalibratedSensor, ReconstructionSettings
-    from optisense.tasks._cylinder_radius import CylinderRadius
-    from optisense.tasks._dataset_settings import DatasetSettings
     from optisense.tasks._draws import ContactDraw
     from optisense.tasks._generation import generate
     from optisense.tasks._misalignment import Misalignment
@@ -24,7 +20,9 @@ if TYPE_CHECKING:
         SampleSettings,
         perceive,
     )
+    from optisense.tasks._press_tasks import BallForce, BallShear, CylinderRadius
     from optisense.tasks._reconstruction import ReconstructionResult, reconstruct
+    from optisense.tasks._sample_settings import DatasetSettings
     from optisense.tasks._snr import signal_to_noise
     from optisense.tasks.dataset import Dataset, Sample
     from optisense.tasks.verification import Verification, VerificationSettings, verify

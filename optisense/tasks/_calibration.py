@@ -24,7 +24,7 @@ from optisense.reading.tilts import normals_of, tilts_of
 from optisense.reading.untouched import UntouchedSurface
 from optisense.tasks._colour_to_normal import METHODS, TiltReader, fit_reader
 from optisense.tasks._draws import Places
-from optisense.tasks._sample_rendering import SampleRendering
+from optisense.tasks._sample_settings import SampleRendering
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel, TactileImage

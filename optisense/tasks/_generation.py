@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import asdict
@@ -24,10 +25,9 @@ from optisense.reading.camera_noise import add_camera_noise
 from optisense.reading.untouched import UntouchedSurface
 from optisense.sensors import save_design
 from optisense.tasks._camera_model import camera_model, ray_arrays
-from optisense.tasks._dataset_settings import DatasetSettings
-from optisense.tasks._digests import file_digest
 from optisense.tasks._draws import DrawnContact, Places, is_cut, keeps_margin
 from optisense.tasks._records import CsvTable, refuse_differences, write_whole
+from optisense.tasks._sample_settings import DatasetSettings
 from optisense.tasks._splits import cell_of, split_of
 from optisense.tasks.dataset import BACKGROUND, CAMERA, DESIGN, Dataset
 from optisense.tasks.dataset_tables import (
@@ -41,6 +41,7 @@ from optisense.tasks.dataset_tables import (
     read_info,
     read_labels,
 )
+from optisense.untrusted_files import MOST_MESH, MOST_STEP, read_bytes
 from optisense.writing import inside, write_json, written_whole
 
 if TYPE_CHECKING:
@@ -316,7 +317,7 @@ class _Maker:
             "made_with": {name: made_with[name] for name in ("optisense", "mitsuba")},
             "settings": values,
             "mesh_files": {
-                text: file_digest(Path(str(indenter.source)))
+                text: _file_digest(Path(str(indenter.source)))
                 for text, indenter in self._indenters.items()
                 if hasattr(indenter, "source")
             },
@@ -391,6 +392,12 @@ class _Maker:
                 ),
             }
         )
+
+
+def _file_digest(path: Path) -> str:
+    """Return the SHA-256 of a file, which identifies an indenter when a dataset is continued."""
+    content = read_bytes(path, max(MOST_MESH, MOST_STEP), TaskError, "the mesh")
+    return hashlib.sha256(content).hexdigest()
 
 
 def _save_arrays(arrays: dict[str, Any], path: Path) -> None:

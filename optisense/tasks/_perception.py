@@ -28,7 +28,7 @@ from optisense.optics.estimators import RADIANCE_CACHE, current_name
 from optisense.reading.camera_noise import add_camera_noise
 from optisense.tasks._records import KEPT, CsvTable, read_object, refuse_differences
 from optisense.tasks._regression import FOLDS, ForestReading, read_by_forest
-from optisense.tasks._sample_rendering import SampleRendering
+from optisense.tasks._sample_settings import SampleRendering
 from optisense.tasks._snr import NEIGHBOURS, signal_to_noise
 from optisense.untrusted_files import COPY_AGAIN
 from optisense.writing import write_json
