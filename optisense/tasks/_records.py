@@ -78,7 +78,7 @@ class CsvTable:
                 where=str(path),
                 hint="Another release may have written it; name another folder",
             )
-        self.rows = read_rows(path)
+        self.rows = read_table(path, TaskError)
 
     def add(self, row: Mapping[str, object]) -> None:
         """Append a row completely or not at all.
@@ -89,7 +89,7 @@ class CsvTable:
         text = {name: _text(row[name]) for name in self.columns}
         before = self._file.tell()
         try:
-            self._file.write(_line([text[name] for name in self.columns]).encode("utf-8"))
+            self._file.write(_line(list(text.values())).encode("utf-8"))
             self._file.flush()
             os.fsync(self._file.fileno())
         except OSError as error:
@@ -100,15 +100,6 @@ class CsvTable:
     def close(self) -> None:
         """Close the file."""
         self._file.close()
-
-
-def read_rows(path: Path) -> list[dict[str, str]]:
-    """Return the rows of a CSV file as text, by column.
-
-    Raises:
-        TaskError: the file cannot be read.
-    """
-    return read_table(path, TaskError)
 
 
 def refuse_differences(

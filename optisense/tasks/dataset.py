@@ -16,11 +16,7 @@ from optisense.tasks._splits import SPLITS
 from optisense.tasks.dataset_tables import INFO, LABELS, read_failures, read_info, read_labels
 from optisense.text import brief
 from optisense.untrusted_arrays import check_arrays, read_arrays
-from optisense.untrusted_files import (
-    COPY_AGAIN,
-    inside,
-    is_file,
-)
+from optisense.untrusted_files import COPY_AGAIN, inside, is_file
 
 BACKGROUND = "background.npz"
 CAMERA = "camera.npz"
@@ -30,23 +26,21 @@ MAKE_AGAIN = "Copy the file again, or make it again: optisense dataset with --me
 
 ArrayKinds = Mapping[str, tuple[str, int | None]]
 
-SAMPLE_ARRAYS: ArrayKinds = {"depth": ("f", None), "normals": ("f", 3), "mask": ("b", None)}
+SAMPLE_ARRAYS: ArrayKinds = {"depth": ("f", None), "mask": ("b", None), "normals": ("f", 3)}
 """Kind of the numbers (as of `numpy.dtype.kind`) and number of channels, None for (h, w), of each
 array that all samples have."""
+
 LATER_ARRAYS: ArrayKinds = {
     "points": ("f", 3),
     "pressure": ("f", None),
     "penetration": ("f", None),
     "displacement": ("f", 3),
 }
-"""Kind and number of channels, as in `SAMPLE_ARRAYS`, of arrays that older datasets lack."""
-BACKGROUND_ARRAYS: ArrayKinds = {"image": ("u", 3), "points": ("f", 3), "normals": ("f", 3)}
-"""Arrays of each file by name, with their allowed types (NumPy's `dtype.kind`) and the number of
-values per pixel. The later arrays may be missing: release 0.1 wrote none of them, and only an
-elastic skin has pressure, penetration and displacement."""
+"""Those of arrays that may be missing: release 0.1 wrote none of them, and only an elastic skin has
+pressure, penetration and displacement."""
 
+BACKGROUND_ARRAYS: ArrayKinds = {"image": ("u", 3), "points": ("f", 3), "normals": ("f", 3)}
 CAMERA_ARRAYS: ArrayKinds = {"points": ("f", 3), "directions": ("f", 3)}
-"""Arrays of `CAMERA`, with their allowed types and the number of values per pixel."""
 
 
 @dataclass(frozen=True)
@@ -151,18 +145,9 @@ class Dataset:
             message = f"sample {labels['index']}: {error.message}"
             hint = error.hint if error.hint not in (None, COPY_AGAIN) else MAKE_AGAIN
             raise TaskError(message, where=error.where, hint=hint) from error
-        return Sample(
-            image=image,
-            depth=arrays["depth"],
-            normals=arrays["normals"],
-            mask=arrays["mask"],
-            labels=labels,
-            points=arrays.get("points"),
-            pressure=arrays.get("pressure"),
-            penetration=arrays.get("penetration"),
-            displacement=arrays.get("displacement"),
-            markers=self._markers(arrays, labels["arrays"]),
-        )
+        known: dict[str, Any] = {name: arrays.get(name) for name in (*SAMPLE_ARRAYS, *LATER_ARRAYS)}
+        markers = self._markers(arrays, labels["arrays"])
+        return Sample(image=image, labels=labels, markers=markers, **known)
 
     def __iter__(self) -> Iterator[Sample]:
         return (self[number] for number in range(len(self)))

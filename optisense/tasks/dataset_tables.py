@@ -8,10 +8,10 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from optisense.errors import TaskError
-from optisense.tasks._records import read_object, read_rows
+from optisense.tasks._records import read_object
 from optisense.tasks._splits import SPLITS
 from optisense.text import brief
-from optisense.untrusted_files import COPY_AGAIN, first_problem
+from optisense.untrusted_files import COPY_AGAIN, first_problem, read_table
 
 SCHEMA_VERSION = 1
 """Version of the format of a dataset's folder; it is raised when older programs cannot read it."""
@@ -117,21 +117,20 @@ def read_labels(folder: Path) -> list[dict[str, Any]]:
     Raises:
         TaskError: the table or one of its rows cannot be read; the message names the line.
     """
-    path = folder / LABELS
-    rows = read_rows(path) if path.exists() else []
-    labels = [_typed(row, f"{path}:{line}") for line, row in enumerate(rows, start=2)]
-    seen: set[int] = set()
-    for line, row in enumerate(labels, start=2):
-        if row["index"] in seen or row["index"] < 0:
+    labels: dict[int, dict[str, Any]] = {}
+    for where, given in _rows(folder / LABELS):
+        row = _typed(given, where)
+        index = row["index"]
+        if index in labels or index < 0:
             raise TaskError(
-                f"sample {row['index']} is listed twice"
-                if row["index"] >= 0
-                else f"the index {row['index']} is negative",
-                where=f"{path}:{line}",
+                f"sample {index} is listed twice"
+                if index >= 0
+                else f"the index {index} is negative",
+                where=where,
                 hint="Delete the line",
             )
-        seen.add(row["index"])
-    return labels
+        labels[index] = row
+    return list(labels.values())
 
 
 def read_failures(folder: Path) -> list[dict[str, str]]:
@@ -140,12 +139,17 @@ def read_failures(folder: Path) -> list[dict[str, str]]:
     Raises:
         TaskError: the table or one of its rows cannot be read; the message names the line.
     """
-    path = folder / FAILURES
-    rows = read_rows(path) if path.exists() else []
-    for line, row in enumerate(rows, start=2):
+    rows = _rows(folder / FAILURES)
+    for where, row in rows:
         if not (row.get("index") or "").isdecimal() or row.get("reason") is None:
-            raise TaskError("a row can't be read", where=f"{path}:{line}", hint=ROW_AGAIN)
-    return rows
+            raise TaskError("a row can't be read", where=where, hint=ROW_AGAIN)
+    return [row for _, row in rows]
+
+
+def _rows(path: Path) -> list[tuple[str, dict[str, str]]]:
+    """Return the rows of a table, each with the place of its line; none if there is no table."""
+    rows = read_table(path, TaskError) if path.exists() else []
+    return [(f"{path}:{line}", row) for line, row in enumerate(rows, start=2)]
 
 
 ROW_AGAIN = "Delete the line; the command that made the dataset then makes the sample again"

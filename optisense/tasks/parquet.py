@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -22,8 +22,8 @@ from optisense.errors import SetupError, TaskError
 from optisense.folders import held
 from optisense.tasks._records import write_whole
 from optisense.tasks._splits import SPLITS, TRAIN
-from optisense.tasks.dataset import Dataset, Sample
-from optisense.tasks.dataset_tables import NUMBER_COLUMNS
+from optisense.tasks.dataset import LATER_ARRAYS, SAMPLE_ARRAYS, Dataset, Sample
+from optisense.tasks.dataset_tables import NUMBER_COLUMNS, WHOLE_COLUMNS
 from optisense.untrusted_files import MOST_PICTURE, read_bytes
 from optisense.writing import inside
 
@@ -38,18 +38,12 @@ group of the file."""
 
 OWN_FILE = re.compile(rf"(?:{'|'.join(SPLITS)})-\d{{5}}-of-\d{{5}}\.parquet")
 
-ARRAYS = {
-    "depth": ("float32", 1),
-    "mask": ("bool", 1),
-    "normals": ("float32", 3),
-    "points": ("float32", 3),
-    "pressure": ("float32", 1),
-    "penetration": ("float32", 1),
-    "displacement": ("float32", 3),
-}
-"""Arrays of a sample: their types, and the number of values per pixel."""
+ARRAYS = {**SAMPLE_ARRAYS, **LATER_ARRAYS}
+"""Arrays of a sample: the kinds of their numbers, and the number of values per pixel."""
 
-WHOLE = ("index", "contact_pixels", "cut", "attempt")
+TYPES = {"f": "float32", "b": "bool"}
+"""Types of the columns of arrays by the kind of their numbers."""
+
 TEXTS = ("indenter", "split")
 
 RENAMED = {"depth": "press_depth", "pressure": "greatest_pressure"}
@@ -143,11 +137,11 @@ def features_of(height: int, width: int) -> dict[str, Any]:
         height, width: size of the pictures, pixels.
     """
     found: dict[str, Any] = {"image": {"_type": "Image"}}
-    for name, (dtype, channels) in ARRAYS.items():
-        shape = [height, width] if channels == 1 else [height, width, channels]
-        found[name] = {"shape": shape, "dtype": dtype, "_type": f"Array{len(shape)}D"}
+    for name, (kind, channels) in ARRAYS.items():
+        shape = [height, width] if channels is None else [height, width, channels]
+        found[name] = {"shape": shape, "dtype": TYPES[kind], "_type": f"Array{len(shape)}D"}
     found |= {name: {"dtype": "string", "_type": "Value"} for name in TEXTS}
-    found |= {name: {"dtype": "int64", "_type": "Value"} for name in WHOLE}
+    found |= {name: {"dtype": "int64", "_type": "Value"} for name in WHOLE_COLUMNS}
     found |= {name: {"dtype": "float64", "_type": "Value"} for name in NUMBERS.values()}
     return found
 
@@ -187,22 +181,20 @@ def _columns(dataset: Dataset, numbers: Sequence[int], features: dict[str, Any])
 
     samples = [dataset[number] for number in numbers]
     rows = [sample.labels for sample in samples]
-    found: dict[str, Any] = {
-        "image": pa.array(list(_pictures(dataset, samples)), _arrow_type(features["image"]))
-    }
+    pictures = [_picture(dataset, sample) for sample in samples]
+    found: dict[str, Any] = {"image": pa.array(pictures, _arrow_type(features["image"]))}
     for name in ARRAYS:
         found[name] = _nested([getattr(sample, name) for sample in samples], features[name])
-    for name, label in {**{each: each for each in (*TEXTS, *WHOLE)}, **NUMBERS}.items():
+    for name, label in {**{each: each for each in (*TEXTS, *WHOLE_COLUMNS)}, **NUMBERS}.items():
         values = [None if row[name] != row[name] else row[name] for row in rows]  # NaN: unknown
         found[label] = pa.array(values, _arrow_type(features[label]))
     return found
 
 
-def _pictures(dataset: Dataset, samples: Sequence[Sample]) -> Iterator[dict[str, object]]:
-    for sample in samples:
-        name = sample.labels["file_name"]
-        content = read_bytes(dataset.folder / name, MOST_PICTURE, TaskError, "the picture")
-        yield {"bytes": content, "path": Path(name).name}
+def _picture(dataset: Dataset, sample: Sample) -> dict[str, object]:
+    name = sample.labels["file_name"]
+    content = read_bytes(dataset.folder / name, MOST_PICTURE, TaskError, "the picture")
+    return {"bytes": content, "path": Path(name).name}
 
 
 def _nested(arrays: Sequence[NDArray[Any] | None], feature: dict[str, Any]) -> Any:
