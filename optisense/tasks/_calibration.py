@@ -4,9 +4,9 @@ places, and a reader of the surface's tilt from colours is fitted to the picture
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -131,10 +131,14 @@ class CalibratedSensor:
         # The background of a real sensor is the mean of many pictures and so has no noise.
         self._background = blank.without_noise().picture(self._exposure).astype(np.float64)
         self.inputs: tuple[object, ...] = (fingerprint(model.design), settings)
-        known = np.concatenate(
-            [self._learned(i, kept) for i in _counted(settings.presses, progress)]
-        )
+        learned = []
+        for index in range(settings.presses):
+            progress(index)
+            inputs = ["ball", *self.inputs, index]
+            learned.append(kept.arrays(inputs, partial(self._press, index), ["pixels"])["pixels"])
+        known = np.concatenate(learned)
         self.fitted_pixels = min(len(known), MOST_SAMPLES)
+        self.readers = readers
         self._readers = [self._fitted(known, number) for number in range(readers)]
 
     def _fitted(self, known: FloatArray, number: int) -> TiltReader:
@@ -171,16 +175,8 @@ class CalibratedSensor:
         seed = [self._settings.seed, self._settings.presses + number, _CAMERA]
         return image, self._picture(image, seed)
 
-    def _learned(self, index: int, kept: KeptArrays) -> FloatArray:
-        """Return colours, places and tilts (n, 7) of pixels of one ball press."""
-        return kept.arrays(
-            ["ball", *self.inputs, index],
-            lambda: {"pixels": np.hstack(self._press(index))},
-            ["pixels"],
-        )["pixels"]
-
-    def _press(self, index: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return colours, places and tilts of pixels in, near and far from one ball press."""
+    def _press(self, index: int) -> dict[str, FloatArray]:
+        """Return colours, places and tilts (n, 7) of pixels in, near and far from a ball press."""
         settings = self._settings
         image = None
         for attempt in range(ATTEMPTS):
@@ -211,7 +207,7 @@ class CalibratedSensor:
         colours, places = self._features(self._picture(image, [settings.seed, index, _CAMERA]))
         tilts = tilts_of(image.normals, *self._frames)
         chosen = _pixels_to_learn(image.contact_mask, self.untouched.seen, rng)
-        return colours[chosen], places[chosen], tilts[chosen]
+        return {"pixels": np.hstack([colours[chosen], places[chosen], tilts[chosen]])}
 
     @cached_property
     def _places(self) -> Places:
@@ -248,9 +244,3 @@ def _pixels_to_learn(
         kept = rng.permutation(pixels)[: count // 2]
         chosen.flat[kept] = True
     return chosen
-
-
-def _counted(count: int, progress: Callable[[int], None]) -> Iterator[int]:
-    for number in range(count):
-        progress(number)
-        yield number

@@ -19,7 +19,6 @@ from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from optisense.array_types import FloatArray
-from optisense.errors import TaskError
 
 BIN = 4.0
 """Width of a bin of the table, levels of 255: a few times the noise of the camera (1 to 2 levels),
@@ -46,8 +45,6 @@ WEIGHT_PENALTY = 0.03
 """Weight of the squared weights in the loss of the network (scikit-learn's `alpha`), which also
 limits overfitting."""
 
-METHODS = ("network", "table")
-
 
 class TiltReader(Protocol):
     """A reader of tilts from colours."""
@@ -67,8 +64,10 @@ class ColourTable:
     Colours fall in bins of BIN levels; a colour whose bin is empty uses the nearest filled bin.
     """
 
-    def __init__(self, colours: FloatArray, places: FloatArray, tilts: FloatArray) -> None:
-        """Fit the table to colours and places, as in `TiltReader.tilts`, with tilts (n, 2)."""
+    def __init__(
+        self, colours: FloatArray, places: FloatArray, tilts: FloatArray, seed: int = 0
+    ) -> None:
+        """Fit the table as `fit_reader` does; the places and the seed have no effect."""
         bins, which = np.unique(np.round(colours / BIN), axis=0, return_inverse=True)
         which = which.reshape(-1)
         count = np.bincount(which)
@@ -76,7 +75,7 @@ class ColourTable:
         self._tilts = np.stack([np.bincount(which, column) / count for column in tilts.T], axis=1)
 
     def tilts(self, colours: FloatArray, places: FloatArray) -> FloatArray:
-        """Return the tilts (n, 2); see `TiltReader.tilts`. The places have no effect."""
+        """Return the tilts (n, 2); see `TiltReader.tilts`."""
         return self._tilts[self._tree.query(colours / BIN)[1]]
 
 
@@ -90,7 +89,7 @@ class ColourNetwork:
     def __init__(
         self, colours: FloatArray, places: FloatArray, tilts: FloatArray, seed: int = 0
     ) -> None:
-        """Fit the network to colours and places, as in `TiltReader.tilts`, with tilts (n, 2)."""
+        """Fit the network as `fit_reader` does."""
         batch = min(BATCH, len(colours))
         epochs = min(MOST_EPOCHS, round(STEPS * batch / len(colours)))
         network = MLPRegressor(
@@ -114,6 +113,10 @@ class ColourNetwork:
         return read
 
 
+METHODS = {"network": ColourNetwork, "table": ColourTable}
+"""Kinds of readers by the name of their method."""
+
+
 def fit_reader(
     method: str, colours: FloatArray, places: FloatArray, tilts: FloatArray, seed: int = 0
 ) -> TiltReader:
@@ -123,12 +126,5 @@ def fit_reader(
         colours: colour differences (n, 3), levels of 255.
         places: places (n, 2) in the picture, -1 to 1 across its width and height.
         tilts: known tilts (n, 2).
-
-    Raises:
-        TaskError: there is no such method.
     """
-    if method == "table":
-        return ColourTable(colours, places, tilts)
-    if method == "network":
-        return ColourNetwork(colours, places, tilts, seed)
-    raise TaskError(f"there is no method '{method}'", hint="Use one of " + ", ".join(METHODS))
+    return METHODS[method](colours, places, tilts, seed)

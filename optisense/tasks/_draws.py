@@ -44,23 +44,16 @@ def keeps_margin(mask: NDArray[np.bool_], margin: float) -> bool:
         mask: (h, w) mask of the contact.
         margin: margin as a share of the width; 0 is always kept.
     """
-    if margin == 0.0:
-        return True
-    inner = mask.copy()
-    free = max(1, round(margin * mask.shape[1]))
-    inner[free:-free, free:-free] = False
-    return not inner.any()
+    return margin == 0.0 or not is_cut(mask, max(1, round(margin * mask.shape[1])))
 
 
-def is_cut(mask: NDArray[np.bool_]) -> bool:
-    """Return whether a contact reaches the picture's edge, so that some of it may be out of view.
-
-    Args:
-        mask: (h, w) mask of the contact.
+def is_cut(mask: NDArray[np.bool_], width: int = 1) -> bool:
+    """Return whether a contact, of a mask (h, w), reaches a strip along the picture's edge of some
+    pixels' width. In the outermost pixels, some of it may be out of view.
     """
-    inner = mask.copy()
-    inner[1:-1, 1:-1] = False
-    return bool(inner.any())
+    outer = mask.copy()
+    outer[width:-width, width:-width] = False
+    return bool(outer.any())
 
 
 class Places:

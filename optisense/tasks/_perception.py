@@ -218,8 +218,6 @@ def collect(
     progress: Callable[[int, int], None] | None = None,
 ) -> Samples:
     """Render, measure and label `settings.count` random contacts; see `perceive`."""
-    if settings.count < 1:
-        raise TaskError(f"{settings.count} samples are asked for", hint="Ask for 1 or more")
     task.check(model)
     first, _ = _contact(task, model, settings, 0)
     refuse_drags([first], settings.skin)

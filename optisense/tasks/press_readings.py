@@ -92,7 +92,6 @@ def read_press(
     areas: FloatArray,
     contact: Contact,
     number: int,
-    readers: int,
     keeps: bool,
     kept: KeptArrays = NOTHING_KEPT,
 ) -> PressReading:
@@ -101,73 +100,49 @@ def read_press(
     Args:
         areas: (h, w) area (mm^2) of skin that each of its pixels sees.
         number: number of the picture, for its noise.
-        readers: number of the sensor's readers, all of which are used.
         keeps: whether the pictures are kept.
     """
     return PressReading.from_arrays(
         kept.arrays(
-            ["reading", *sensor.inputs, contact, number, readers],
-            lambda: _read(sensor, areas, contact, number, readers, keeps).as_arrays(),
+            ["reading", *sensor.inputs, contact, number, sensor.readers],
+            lambda: _read(sensor, areas, contact, number, keeps).as_arrays(),
             [*READING_ARRAYS, *(PICTURE_ARRAYS if keeps else ())],
         )
     )
 
 
 def _read(
-    sensor: CalibratedSensor,
-    areas: FloatArray,
-    contact: Contact,
-    number: int,
-    readers: int,
-    keeps: bool,
+    sensor: CalibratedSensor, areas: FloatArray, contact: Contact, number: int, keeps: bool
 ) -> PressReading:
     image, picture = sensor.take_picture(contact, number)
     mask = image.contact_mask & (areas > 0.0)
     true = image.normals.astype(np.float64)
     true_depth = sensor.untouched.image_depth(image).astype(np.float64)
-    angles, depths = [], []
-    first = None
-    for reader in range(readers):
-        normals, depth = sensor.read(picture, reader)
-        first = normals if first is None else first
-        angles.append(angles_between(normals, true)[mask])
-        depths.append(np.abs(depth - true_depth)[mask])
-    assert first is not None
+    read = [sensor.read(picture, reader) for reader in range(sensor.readers)]
+    angles = [angles_between(normals, true) for normals, _ in read]
     pictures = None
     if keeps:
-        off = np.where(image.contact_mask, angles_between(first, true), np.nan)
-        narrow = (each.astype(np.float32) for each in (true, first, off))
+        off = np.where(image.contact_mask, angles[0], np.nan)
+        narrow = (each.astype(np.float32) for each in (true, read[0][0], off))
         pictures = PressPictures(picture, *narrow)
     return PressReading(
         points=sensor.untouched.points[mask],
         areas=areas[mask],
-        angles=np.array(angles),
-        depths=np.array(depths),
+        angles=np.array([each[mask] for each in angles]),
+        depths=np.array([np.abs(depth - true_depth)[mask] for _, depth in read]),
         flat_angles=angles_between(sensor.untouched.normals, true)[mask],
         flat_depths=np.abs(true_depth)[mask],
         pictures=pictures,
     )
 
 
-def check_seen(name: str, pair: Sequence[PressReading]) -> None:
-    """Check that a sensor sees the contact of an object.
-
-    Args:
-        pair: the readings of its press by two sensors.
-
-    Raises:
-        TaskError: neither camera sees the contact.
-    """
-    if not any(len(each.areas) for each in pair):
-        raise not_seen(name)
-
-
-def not_seen(name: str) -> TaskError:
-    """Return the error of an object whose contact neither camera sees."""
-    return TaskError(
-        f"no camera sees the {name} where it presses",
-        hint="Use a higher --resolution, or another --seed",
-    )
+def check_seen(name: str, seen: bool) -> None:
+    """Raise TaskError unless a camera sees the contact of an object."""
+    if not seen:
+        raise TaskError(
+            f"no camera sees the {name} where it presses",
+            hint="Use a higher --resolution, or another --seed",
+        )
 
 
 def whole_errors(

@@ -37,7 +37,6 @@ from optisense.tasks.press_readings import (
     PressReading,
     check_seen,
     flat_errors,
-    not_seen,
     read_press,
     whole_errors,
 )
@@ -276,9 +275,11 @@ def verify(
     reach = 0.0
     trees = []
     for number, model in enumerate(models):
-        on_press = _progress_of_sensor(
-            progress, number, settings.reading.presses + len(chosen.presses)
-        )
+
+        def on_press(done: int, side: int = number) -> None:
+            if progress is not None:
+                progress(side, done, settings.reading.presses + len(chosen.presses))
+
         sensor = CalibratedSensor(model, settings.reading, on_press, settings.readers, kept)
         areas = _areas(model, sensor)
         others = readings[0] if readings else None
@@ -321,12 +322,6 @@ def verify(
     )
 
 
-def _progress_of_sensor(
-    progress: Callable[[int, int, int], None] | None, sensor: int, count: int
-) -> Callable[[int], None]:
-    return lambda done: None if progress is None else progress(sensor, done, count)
-
-
 def _check_views(
     models: tuple[OpticalModel, OpticalModel],
     presses: Sequence[UnseenPress],
@@ -347,12 +342,12 @@ def _check_views(
         size = reading.resolution or model.design.camera.size_at(reading.width)
         views.append((model, size, pixel_areas(model.chief_rays(size)) > 0.0))
     for press in presses:
-        if not any(
+        found = any(
             (model.chief_rays(size, [contact], skin).contact_mask & seen).any()
             for skin in dict.fromkeys((CONFORMING, reading.skin))
             for (model, size, seen), contact in zip(views, press.contacts, strict=True)
-        ):
-            raise not_seen(press.name)
+        )
+        check_seen(press.name, found)
 
 
 def _areas(model: OpticalModel, sensor: CalibratedSensor) -> FloatArray:
@@ -400,10 +395,9 @@ def _read_all(
     for number, press in enumerate(presses):
         on_press(settings.reading.presses + number)
         keeps = number % settings.places == 0
-        found.append(
-            read_press(sensor, areas, press.contacts[side], number, settings.readers, keeps, kept)
-        )
+        found.append(read_press(sensor, areas, press.contacts[side], number, keeps, kept))
         if others is not None:
-            check_seen(press.name, (others[number], found[number]))
+            pair = others[number], found[number]
+            check_seen(press.name, any(len(each.areas) for each in pair))
     on_press(settings.reading.presses + len(presses))
     return found
