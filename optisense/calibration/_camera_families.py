@@ -56,11 +56,8 @@ _LETTERS = "RGB"
 
 
 def notes_on_kinds(design: SensorDesign, families: Sequence[str]) -> list[str]:
-    """Return a note on each component of the camera that is not fitted, as it is of another kind
-    than its family fits.
-
-    Args:
-        families: names of the families that are fitted.
+    """Return a note on each component of the camera that is not fitted because it is of another
+    kind than its family, one of those named, fits.
     """
     fitted: dict[str, tuple[str, type[KindModel], str]] = {
         "tone": ("tone_curve", GammaCurve, "gamma"),

@@ -53,16 +53,11 @@ def placed(
     exposure: float | None = None,
     kept: KeptArrays = NOTHING_KEPT,
 ) -> list[SeenContact]:
-    """Return the contacts where the model's responses are closest to the photographs'.
+    """Return the contacts where the model's responses are closest to the photographs', which have
+    the size of a fit.
 
-    Args:
-        photographs: photographs, at the size of a fit.
-        photons: number of photons of the light.
-        exposure: factor on the radiance; the one that brings the background closest if None.
-
-    Raises:
-        CalibrationError: a contact is not on the model's skin.
-        OptiSenseError: the model can't be rendered.
+    The exposure is a factor on the radiance; if None, it brings the background closest. A contact
+    that is not on the model's skin raises CalibrationError.
     """
     found = list(seen)
     moving = list(range(len(found)))

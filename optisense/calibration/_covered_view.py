@@ -93,12 +93,9 @@ def outline_of(*coverages: FloatArray) -> SkinOutline | None:
 def with_smooth_outline(
     layers: NDArray[FloatType], coverage: FloatArray, outline: SkinOutline | None = None
 ) -> NDArray[FloatType]:
-    """Return layers (groups, h, w, 3) whose pixels at the outline are averages of skin and rest.
-
-    Args:
-        layers: radiance, or levels of a picture.
-        coverage: share (h, w) of each pixel that sees skin.
-        outline: the outline; that of `coverage` by default.
+    """Return layers (groups, h, w, 3) of radiance or of levels, whose pixels at the outline are
+    averages of skin and rest by the coverage (h, w). The outline is that of the coverage by
+    default.
     """
     outline = outline or outline_of(coverage)
     if outline is None:

@@ -92,11 +92,7 @@ def realism_and_readings(
     seen: Sequence[SeenContact],
     pictures: ModelPictures,
 ) -> Realism:
-    """Return all figures of a model's pictures beside photographs.
-
-    Args:
-        pictures: pictures of the model, of the same presses.
-    """
+    """Return all figures of a model's pictures beside photographs of the same presses."""
     found = realism(photographs, seen, pictures)
     # Far from a contact, a response is the noise of two photographs.
     noise = found.median("far_real") / np.sqrt(2.0)
@@ -113,19 +109,12 @@ def cross_readings(
     axes: FloatArray,
     noise: float,
 ) -> tuple[CrossReading, ...]:
-    """Calibrate a reader on the model and one on the photographs, and read the other's contacts.
+    """Calibrate a reader on the model and one on the photographs of the same presses, and return a
+    reading of the other's contact for each press; none if there are fewer than three.
 
-    Noise of the photographs is added to the model's pictures, because a reader that knows no noise
-    amplifies it.
-
-    Args:
-        pictures: pictures of the model, of the same presses.
-        rays: the model's chief rays at the photographs' size.
-        axes: axes (3, 3) of the camera: right, up and viewing direction.
-        noise: standard deviation of the photographs' noise, levels.
-
-    Returns:
-        A reading for each press; none if there are fewer than three.
+    Noise of the photographs, of this standard deviation in levels, is added to the model's
+    pictures, because a reader that knows no noise amplifies it. The rays are the model's chief rays
+    at the photographs' size, and the axes (3, 3) the camera's right, up and viewing direction.
     """
     if len(seen) < FEWEST:
         return ()

@@ -79,14 +79,11 @@ class ErrorScale:
 
 
 def correlated_pixels(errors: Sequence[FloatArray], masks: Sequence[NDArray[np.bool_]]) -> float:
-    """Return the number of pixels for which there is one independent error, 1 or more.
+    """Return the number of pixels for which there is one independent error, 1 or more, from errors
+    (h, w, 3) of pictures and masks (h, w) of the pixels that count.
 
     It is the sum of the correlation over all displacements, up to the distance at which the mean
     over the directions falls below 0.1, and at most a fifth of the picture's width.
-
-    Args:
-        errors: errors (h, w, 3) of each picture.
-        masks: pixels (h, w) of each picture that count.
     """
     height, width = masks[0].shape
     shape = next_fast_len(2 * height, real=True), next_fast_len(2 * width, real=True)
@@ -118,14 +115,11 @@ def error_scale(
     masks: Sequence[NDArray[np.bool_]],
     pixels: float | None = None,
 ) -> ErrorScale:
-    """Return the scale of errors, unaffected by dust.
+    """Return the scale of errors (h, w, 3), relative to the expected ones, at the pixels of masks
+    (h, w), unaffected by dust.
 
-    Errors above `HUBER` are reduced to it in the estimate of their correlation.
-
-    Args:
-        errors: errors (h, w, 3) of each picture, relative to the expected ones.
-        masks: pixels (h, w) of each picture that count.
-        pixels: number of pixels for which there is one independent error; estimated if None.
+    Errors above `HUBER` are reduced to it in the estimate of their correlation, which is made if
+    the number of pixels for one independent error is None.
     """
     inside = np.concatenate([error[mask] for error, mask in zip(errors, masks, strict=True)])
     size = max(TO_DEVIATION * float(np.median(np.abs(inside))), 1.0)
@@ -165,12 +159,8 @@ class Scales:
         masks: Sequence[NDArray[np.bool_]],
         pixels: float | None,
     ) -> Scales:
-        """Return the scales of errors, unaffected by dust.
-
-        Args:
-            errors: errors (h, w, 3) of the background and of each response, levels.
-            masks: masks (h, w) of the pixels of the background and of each response that count.
-            pixels: see `LayeredFit`.
+        """Return the scales of errors (h, w, 3) of the background and of each response, levels, at
+        the pixels of masks (h, w); `pixels` is that of `LayeredFit`.
         """
         ground, *pressed = (error / own for error, own in zip(errors, expected, strict=True))
         return Scales(
@@ -185,13 +175,9 @@ def expected_errors(
 ) -> list[FloatArray]:
     """Return the expected errors (h, w, 3) of the background and of the responses, in levels.
 
-    They come from the noise of the photographs and of the light, and, at the outline of the skin,
-    from the brightness of the skin, which is that of the nearest pixel inside.
-
-    Args:
-        background: (h, w, 3) the model's background, levels.
-        noise: a sample (h, w, 3) of the light's noise in the background and in each response.
-        outline: outline of the skin, if its share of pixels is known.
+    They come from the noise of the photographs and of the light, of which there is a sample (h, w,
+    3) for each, and, at the outline of the skin, from the brightness of the skin, which is that of
+    the nearest pixel inside.
     """
     window = (NOISE_EXTENT, NOISE_EXTENT, 0.0)
     expected = [np.sqrt(PHOTOGRAPH_NOISE**2 + gaussian_filter(each**2, window)) for each in noise]

@@ -29,21 +29,14 @@ at two, and below 0.01 from three on."""
 
 
 def without_drift(difference: FloatArray, distance: FloatArray) -> FloatArray:
-    """Return the response in a photograph: its difference from the background, without the drift.
-
-    Args:
-        difference: photograph minus background, (h, w, 3), levels.
-        distance: distances (h, w) from the contact's middle, in its radii.
+    """Return the response in a photograph: its difference (h, w, 3) from the background, levels,
+    without the drift. Distances (h, w) are those from the contact's middle, in its radii.
     """
     return difference - drift(difference, distance)
 
 
 def drift(difference: FloatArray, distance: FloatArray) -> FloatArray:
-    """Return the mean difference (3,) of R, G and B in the far field; 0 if it is too small.
-
-    Args:
-        difference, distance: see `without_drift`.
-    """
+    """Return the mean difference (3,) of R, G and B in the far field; 0 if it is too small."""
     far = distance > FAR
     if far.mean() < LEAST_SHARE:
         return np.zeros(difference.shape[-1])
@@ -51,14 +44,11 @@ def drift(difference: FloatArray, distance: FloatArray) -> FloatArray:
 
 
 def without_noise(error: FloatArray, where: NDArray[np.bool_]) -> float:
-    """Return the root mean square of an error's part that is no noise.
+    """Return the root mean square of the part of an error (h, w, 3), in levels, that is no noise,
+    over the pixels of a mask (h, w).
 
     Noise has no correlation between pixels at a distance, and smooth errors have. So the mean
     product of such pixels is the mean square of the smooth part; with noise alone it is about 0.
-
-    Args:
-        error: error (h, w, 3), levels.
-        where: mask (h, w) of the pixels that count.
     """
     reach = NOISE_REACH
     products = [

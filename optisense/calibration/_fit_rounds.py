@@ -169,15 +169,9 @@ class FitRounds:
         noise: LayeredPictures | None,
         kept: Sequence[int],
     ) -> Solution:
-        """Fit to layers that were rendered at `steps`; whenever the view has moved, the layers are
-        displaced to it and fitted again.
-
-        Args:
-            small, seen, layers, slopes: see `LayeredFit`.
-            steps: (n,) start of the fit.
-            rough: whether the round is rough.
-            noise: sample of the noise of the layers, if it is known.
-            kept: indices of the numbers that are not changed.
+        """Fit to layers that were rendered at `steps` (n,), where the fit starts; whenever the view
+        has moved, the layers are displaced to it and fitted again. Numbers whose indices are kept
+        do not change.
         """
         pixels = ROUGH_PIXELS if rough else None
         views = [number for number in self._rendering if self._chosen[number].views]
@@ -244,13 +238,9 @@ class FitRounds:
         contacts: LayeredPictures | None = None,
         more: int = 0,
     ) -> LayeredPictures:
-        """Return layers of a round, with light of its own noise, at the current values of numbers
-        that need a rendering; all others are those of the design.
-
-        Args:
-            small, seen: see `layered_pictures`.
-            steps: (n,) current values.
-            more: number that is added to the seed.
+        """Return layers of a round, with light of its own noise, at the current steps (n,) of
+        numbers that need a rendering; all others are those of the design. `more` is added to the
+        seed.
         """
         moved = [self._chosen[number] for number in self._rendering]
         self._model.set_design(designed(self._design, moved, steps[self._rendering]))
@@ -304,13 +294,9 @@ class FitRounds:
         number: int,
         layers: LayeredPictures,
     ) -> dict[int, PictureSlopes]:
-        """Return the slopes of the numbers that need a rendering, by index, from renderings of a
-        round on both sides of their values.
-
-        Args:
-            small, seen: see `layered_pictures`.
-            steps: (n,) current values.
-            layers: layers whose contacts are pressed in again if a number does not move them.
+        """Return the slopes of the numbers that need a rendering, by index, from renderings on both
+        sides of their current steps (n,). Contacts of the layers are pressed in again if a number
+        does not move them.
         """
         found: dict[int, PictureSlopes] = {}
         for index in self._bodily:

@@ -166,12 +166,8 @@ class LayeredFit:
         self, steps: FloatArray, contacts: FloatArray, noise: LayeredPictures | None = None
     ) -> list[FloatArray]:
         """Return the levels (h, w, 3) of the background and of each press, within those that are
-        compared.
-
-        Args:
-            steps: (n,) steps of the quantities, in plausible ranges from their starts.
-            contacts: (presses, 3) changes of column, row (pixels) and the logarithm of the radius.
-            noise: added to the layers.
+        compared, for steps (n,) of the quantities, in plausible ranges from their starts, and
+        changes (presses, 3) of the contacts' column, row (pixels) and logarithm of the radius.
         """
         steps, contacts = self._reduced(steps, contacts)
         return [self._shown(-1, steps, None, noise)] + [
@@ -225,10 +221,8 @@ class LayeredFit:
         return np.asarray(found)
 
     def solve(self, steps: FloatArray, contacts: FloatArray) -> Solution:
-        """Run damped Gauss-Newton steps until the sum of squares stops falling.
-
-        Args:
-            steps, contacts: start of the descent, as in `pictures`.
+        """Run damped Gauss-Newton steps from a start, as in `pictures`, until the sum of squares
+        stops falling.
         """
         point = self._point(steps, contacts)
         for _ in range(MOST_DESCENTS):

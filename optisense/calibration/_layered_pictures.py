@@ -102,18 +102,11 @@ def layered_pictures(
     kept: KeptArrays = NOTHING_KEPT,
     progress: Callable[[int], None] = lambda done: None,
 ) -> LayeredPictures:
-    """Render the background and the presses of photographs as layers.
+    """Render the background and the presses of photographs as layers, at their size.
 
-    Args:
-        photographs: photographs whose size and presses are used.
-        photons: number of photons of the light that all pictures share.
-        contacts: contacts to press in, if they are known already.
-        kept: store of the layers of each picture.
-        progress: function that is called with the number of finished pictures.
-
-    Raises:
-        CalibrationError: a contact is not on the skin.
-        OptiSenseError: the model can't be rendered, or a rendering can't be stored.
+    Contacts that are known already are pressed in again. `kept` stores the layers of each picture,
+    and `progress` is called with the number of finished pictures. A contact that is not on the skin
+    raises CalibrationError.
     """
     view = CoveredView.of(model, photographs.size)
     if contacts is None:

@@ -69,12 +69,8 @@ class Solution:
 def normal_equations(
     equations: Iterable[LinearEquations], size: int, blocks: NDArray[np.int64]
 ) -> tuple[FloatArray, FloatArray]:
-    """Return matrices (blocks, n, n) and gradients (blocks, n) of blocks of the pictures, without
-    priors.
-
-    Args:
-        size: number of all unknowns, n.
-        blocks: number (h, w) of the block to which each pixel belongs.
+    """Return the matrices (blocks, n, n) and gradients (blocks, n) of `size` unknowns, without
+    priors, for blocks of the pictures; each pixel belongs to the block of a number (h, w).
     """
     count = int(blocks.max()) + 1
     matrices, gradients = np.zeros((count, size, size)), np.zeros((count, size))
@@ -92,12 +88,8 @@ def normal_equations(
 def noise_energy(
     mean: Iterable[LinearEquations], half: Iterable[LinearEquations], size: int
 ) -> FloatArray:
-    """Return the part (n, n) of the normal matrix that is due to the noise of its derivatives.
-
-    Args:
-        mean: equations whose derivatives are those of the mean of two renderings.
-        half: equations of one of the two.
-        size: number of all unknowns, n.
+    """Return the part (n, n) of the normal matrix that is due to the noise of its derivatives, from
+    the equations of the mean of two renderings and those of one of the two.
     """
     energy = np.zeros((size, size))
     for (unknowns, one, weight, _, _), (_, other, _, _, _) in zip(mean, half, strict=True):
@@ -107,18 +99,14 @@ def noise_energy(
 
 
 def slope_reduction(matrix: FloatArray, energy: FloatArray, noisy: list[int]) -> FloatArray:
-    """Return the change (n, m) of all unknowns for each unit of the noisy ones, which turns noisy
+    """Return the change (n, m) of all unknowns for each unit of the m noisy ones, which turns noisy
     slopes into the best estimates of the true ones.
 
     A difference of two renderings contains the noise of their light, whose square would count as
     information. The best estimate of a true slope is a noisy one times the share of its energy that
     is no noise ("regression calibration", Carroll et al. 2006). Changes that other numbers explain
-    are left as they are, because noise hardly looks like them. Without noise the change is 0.
-
-    Args:
-        matrix: (n, n) normal matrix of the slopes, with priors of unit variance.
-        energy: (n, n) the part of it that is due to noise.
-        noisy: indices of the m unknowns with noisy slopes.
+    are left as they are, because noise hardly looks like them. The matrix (n, n) is the normal
+    matrix with priors of unit variance, and the energy (n, n) the part of it that is due to noise.
     """
     count = len(noisy)
     others = np.setdiff1d(np.arange(len(matrix)), noisy)
@@ -141,17 +129,14 @@ def slope_reduction(matrix: FloatArray, energy: FloatArray, noisy: list[int]) ->
 
 
 def jackknife_covariance(matrices: FloatArray, scores: FloatArray) -> FloatArray:
-    """Return the covariance (n, n) of the unknowns of a least-squares fit with priors.
+    """Return the covariance (n, n) of the unknowns of a least-squares fit with priors, from the
+    normal matrix (n, n) and the gradient (n,) of each cluster at the solution.
 
     The fit is repeated without each of the clusters, in one step, and the unknowns scatter. Errors
     may be correlated within clusters, but not between them. Residuals are smaller than errors where
     a cluster dominates the fit; the jackknife takes this into account (Bell and McCaffrey 2002,
     estimator CR3). The covariance of the posterior is added: it contains the priors, and is a lower
     limit where the scatter of a few clusters is small by chance.
-
-    Args:
-        matrices: (clusters, n, n) normal matrix of each cluster; the priors add a unit matrix.
-        scores: (clusters, n) gradient of each cluster at the solution.
     """
     count, size = scores.shape
     total = matrices.sum(axis=0) + np.eye(size)

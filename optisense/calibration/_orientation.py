@@ -41,12 +41,8 @@ another sensor are like the model in no way."""
 def orientation_notes(
     photographs: Photographs, seen: Sequence[SeenContact], pictures: ModelPictures
 ) -> list[str]:
-    """Return a note if the photographs are clearly more like the model when they are mirrored,
-    turned by 180 degrees, or their red and blue are exchanged.
-
-    Args:
-        seen: contact in each photograph.
-        pictures: pictures of the model, of the same presses.
+    """Return a note if the photographs are clearly more like the model's pictures of the same
+    presses when they are mirrored, turned by 180 degrees, or their red and blue are exchanged.
     """
     found = _likenesses(photographs, seen, pictures)
     best = max(found.values())

@@ -47,14 +47,11 @@ def view_changes(
     after: CoveredView,
 ) -> list[NDArray[np.float32]]:
     """Return the changes (groups, h, w, 3) of the layers of the background and of each press by a
-    change of the view.
+    change of the view, at the size of the layers.
 
     Contacts stay where the photographs show them. A contact of the same radius in pixels covers
     more of the skin if a pixel does, and the tilts of a ball's surface grow in proportion: so does
     the response.
-
-    Args:
-        before, after: views before and after the change, at the size of the layers.
     """
     columns, rows = displacements(before.rays, after.rays)
     outline = outline_of(before.coverage, after.coverage)

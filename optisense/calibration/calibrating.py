@@ -116,10 +116,8 @@ def calibrate(
 def _refuse_too_few(
     photographs: Photographs, chosen: Sequence[FitQuantity], held_out: Sequence[int]
 ) -> list[str]:
-    """Return notes on the number of photographs.
-
-    Raises:
-        CalibrationError: there are too few photographs, or no number is to be fitted.
+    """Return notes on the number of photographs; raise CalibrationError if there are too few, or if
+    no number is to be fitted.
     """
     count = len(photographs.presses) - len(held_out)
     if not chosen:

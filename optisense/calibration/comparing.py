@@ -47,13 +47,9 @@ def usable(
     photographs: Photographs, *, refine: bool = True
 ) -> tuple[Photographs, list[SeenContact], list[str]]:
     """Return the photographs at working size that show a contact, their contacts, and doubtful
-    findings.
+    findings; CalibrationError is raised if none shows a contact.
 
-    Args:
-        refine: whether labelled contacts are searched near their labels too.
-
-    Raises:
-        CalibrationError: no photograph shows a contact.
+    `refine` says whether labelled contacts are searched near their labels too.
     """
     small = photographs.scaled()
     finder = ContactFinder(small)

@@ -97,16 +97,11 @@ def find_contact(
     near: tuple[float, float] | None = None,
     radius: float | None = None,
 ) -> FoundContact | None:
-    """Return the contact in a photograph of a pressed ball.
+    """Return the contact in a photograph (h, w, 3) of a pressed ball, or None if no response stands
+    out from the noise of its difference from the background.
 
-    Args:
-        picture: photograph of the press, (h, w, 3).
-        background: photograph of the untouched sensor, (h, w, 3).
-        near: column and row of a first guess, such as a label; the strongest response if None.
-        radius: radius of a first guess, pixels.
-
-    Returns:
-        The contact, or None if no response stands out from the noise.
+    It is searched near a first guess of column, row and radius in pixels, such as a label, or else
+    where the response is strongest.
     """
     return _contact_in(difference(picture, background), near, radius)
 
@@ -114,14 +109,10 @@ def find_contact(
 def find_another(
     picture: NDArray[np.uint8], background: NDArray[np.uint8], known: FoundContact
 ) -> FoundContact | None:
-    """Return a second contact in a photograph, beside a known one, or None if there is none as
-    strong.
+    """Return a second contact in a photograph (h, w, 3), beside a known one, or None if there is
+    none as strong.
 
     Two contacts in each of several photographs mean that the background shows one of them.
-
-    Args:
-        picture: photograph of the press, (h, w, 3).
-        background: photograph of the untouched sensor, (h, w, 3).
     """
     response = difference(picture, background)
     rows, columns = np.mgrid[: response.shape[0], : response.shape[1]] + 0.5

@@ -56,17 +56,11 @@ def model_pictures(
     kept: KeptArrays = NOTHING_KEPT,
     progress: Callable[[int], None] = lambda done: None,
 ) -> ModelPictures:
-    """Render the background and the presses of photographs.
+    """Render the background and the presses of photographs, with an exposure that brings the
+    background closest if it is None.
 
-    Args:
-        photons: number of photons of the light that all pictures share.
-        exposure: factor on the radiance; the one that brings the background closest if None.
-        progress: function that is called with the number of finished pictures.
-
-    Raises:
-        CalibrationError: the photographs have another shape than the model's pictures, or a
-            contact is not on its skin.
-        OptiSenseError: the design can't be rendered.
+    Photographs of another shape than the model's pictures, and contacts that are not on its skin,
+    raise CalibrationError. `progress` is called with the number of finished pictures.
     """
     check_shape(photographs, model)
     layers = layered_pictures(model, photographs, seen, photons, seed, kept=kept, progress=progress)
@@ -87,14 +81,9 @@ def levels_of(radiance: NDArray[np.floating], chain: PictureChain, exposure: flo
 def matched_exposure(
     radiance: NDArray[np.floating], chain: PictureChain, photograph: NDArray[np.uint8]
 ) -> float:
-    """Return the factor on radiance whose picture is closest to a photograph, by least squares.
-
-    Args:
-        radiance: (h, w, 3) radiance, mW/(mm^2 sr).
-        photograph: (h, w, 3) uint8.
-
-    Raises:
-        CalibrationError: the radiance is 0 everywhere.
+    """Return the factor on radiance (h, w, 3), mW/(mm^2 sr), whose picture is closest to a
+    photograph (h, w, 3), by least squares; CalibrationError is raised if the radiance is 0
+    everywhere.
     """
     if not radiance.max() > 0.0:
         raise CalibrationError(

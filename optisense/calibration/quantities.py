@@ -37,15 +37,11 @@ their numbers are all set."""
 def quantities_of(
     design: SensorDesign, families: Sequence[str], asked: Sequence[tuple[str, float, float]] = ()
 ) -> list[FitQuantity]:
-    """Return the quantities of a design that are fitted.
+    """Return the quantities of a design that are fitted: those of families of `FAMILIES`, and
+    further numbers that are asked for by path, smallest and largest value.
 
-    Args:
-        families: names of families, of `FAMILIES`.
-        asked: path, smallest and largest value of further numbers of the design.
-
-    Raises:
-        CalibrationError: a family is unknown, or a range does not contain the design's value.
-        DesignError: a path names no value.
+    A family that is unknown, and a range that does not contain the design's value, raise
+    CalibrationError; a path that names no value raises DesignError.
     """
     unknown = [name for name in families if name not in FAMILIES]
     if unknown:
@@ -105,13 +101,8 @@ def fits_all_powers(design: SensorDesign, chosen: Sequence[FitQuantity]) -> bool
 def designed(
     design: SensorDesign, chosen: Sequence[FitQuantity], steps: FloatArray
 ) -> SensorDesign:
-    """Return a design with the numbers of a fit.
-
-    Args:
-        steps: (n,) distance of each from its start, in plausible ranges.
-
-    Raises:
-        DesignError: the numbers do not fit together.
+    """Return a design with the numbers of a fit, each at its step (n,) from its start in plausible
+    ranges; numbers that do not fit together raise DesignError.
     """
     values = {each.path: each.value(float(step)) for each, step in zip(chosen, steps, strict=True)}
     found = _prepared(design, [each.path for each in chosen])
@@ -138,11 +129,8 @@ def _prepared(design: SensorDesign, paths: Sequence[str]) -> SensorDesign:
 def chain_with(
     chain: PictureChain, chosen: Sequence[FitQuantity], steps: FloatArray
 ) -> PictureChain:
-    """Return the picture chain of the fitted design, without building the design.
-
-    Args:
-        chain: picture chain of the design that the quantities are of.
-        steps: (n,) distance of each from its start, in plausible ranges.
+    """Return the picture chain of the fitted design, without building the design, from that of the
+    design and the steps (n,) of the quantities.
     """
     matrix: FloatArray | None = None
     changed: dict[str, Any] = {}

@@ -197,11 +197,7 @@ def sees_no_curvature(radius: float) -> bool:
 def realism(
     photographs: Photographs, seen: Sequence[SeenContact], pictures: ModelPictures
 ) -> Realism:
-    """Compare a model's pictures with photographs.
-
-    Args:
-        pictures: pictures of the model, of the same presses.
-    """
+    """Compare a model's pictures with photographs of the same presses."""
     real = photographs.background.astype(np.float64)
     presses = tuple(
         _press(
@@ -296,13 +292,9 @@ def _brightening(
 
 
 def similarity(one: FloatArray, other: FloatArray, window: float) -> FloatArray:
-    """Return the structural similarity (h, w) of two pictures (h, w, 3), mean over the channels.
-
-    Wang, Bovik, Sheikh and Simoncelli 2004, with a Gaussian window.
-
-    Args:
-        one, other: pictures, levels of 255.
-        window: standard deviation of the window, pixels.
+    """Return the structural similarity (h, w) of two pictures (h, w, 3) in levels, mean over the
+    channels, with a Gaussian window of a standard deviation in pixels (Wang, Bovik, Sheikh and
+    Simoncelli 2004).
     """
 
     def blurred(values: FloatArray) -> FloatArray:

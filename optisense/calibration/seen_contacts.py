@@ -221,13 +221,9 @@ def check_shape(photographs: Photographs, model: OpticalModel) -> None:
 def contact_of(
     press: PhotographedPress, seen: SeenContact, model: OpticalModel, rays: ChiefRays
 ) -> Contact:
-    """Return the contact of a model that touches where a photograph shows it.
-
-    Args:
-        rays: chief rays of the model, at the photograph's size.
-
-    Raises:
-        CalibrationError: the contact is not on the skin, too wide for the ball, or too deep.
+    """Return the contact of a model that touches where a photograph shows it, by the model's chief
+    rays at the photograph's size; CalibrationError is raised if it is not on the skin, too wide for
+    the ball, or too deep.
     """
     size = min(np.sort(np.ptp(gel.vertices, axis=0))[1] for gel in model.gels)
     if press.diameter > 2.0 * size:
@@ -266,10 +262,7 @@ def place_on_skin(
     centre: tuple[float, float], rays: ChiefRays, name: str
 ) -> tuple[tuple[float, float, float], float]:
     """Return the point of the skin, mm, at a position in the picture, and the size of a pixel
-    there, mm.
-
-    Raises:
-        CalibrationError: the camera sees no skin at this position.
+    there, mm; CalibrationError is raised where the camera sees no skin.
     """
     column, row = centre[0] - 0.5, centre[1] - 0.5
     steps = np.array([[0.0, 0.0], [-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]])

@@ -56,14 +56,8 @@ class CalibrationSettings:
         return self.photons if last else max(round(EARLIER_PHOTONS * self.photons), 1)
 
     def check_held_out(self, photographs: Photographs, shown: Photographs) -> None:
-        """Check the names of the presses that are held out.
-
-        Args:
-            photographs: all photographs.
-            shown: those that show a contact.
-
-        Raises:
-            CalibrationError: there is no press of a name, or it shows no contact.
+        """Raise CalibrationError if no photograph has a name that is held out, or if it is not
+        among those that show a contact.
         """
         names = [press.name for press in photographs.presses]
         for name in self.held_out or ():

@@ -166,10 +166,8 @@ class CalibratedSensor:
     def take_picture(
         self, contact: Contact, number: int = 0
     ) -> tuple[TactileImage, NDArray[np.uint8]]:
-        """Return the image of a contact, and the picture (h, w, 3) that the camera stores.
-
-        Args:
-            number: number of the picture; each has noise of its own.
+        """Return the image of a contact, and the picture (h, w, 3) that the camera stores; each
+        number of a picture has noise of its own.
         """
         image = self._render([contact])
         seed = [self._settings.seed, self._settings.presses + number, _CAMERA]

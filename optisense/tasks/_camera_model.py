@@ -33,16 +33,11 @@ stretches its edge without bound."""
 
 
 def ray_arrays(rays: ChiefRays) -> dict[str, NDArray[np.float32]]:
-    """Return the ray of each pixel inside the gel, NaN where the camera sees no skin.
+    """Return the ray of each pixel inside the gel, from chief rays without contacts: "points" (h,
+    w, 3), mm, where it meets the skin at rest, and "directions" (h, w, 3), unit vectors along which
+    light from the skin travels, in the frame of the design; NaN where the camera sees no skin.
 
-    Args:
-        rays: chief rays without contacts.
-
-    Returns:
-        "points" (h, w, 3), mm, the intersections with the skin at rest, and "directions" (h, w, 3),
-        unit vectors along which light from the skin travels, opposite to the view; both in the
-        frame of the design. A visible point of a pressed skin lies at ``points + s * directions``
-        with some s >= 0 in mm.
+    A visible point of a pressed skin lies at ``points + s * directions`` with some s >= 0 in mm.
     """
     seen = rays.hit[..., None]
     return {
@@ -79,12 +74,9 @@ class Pinhole:
 
     @staticmethod
     def of(camera: Camera, resolution: tuple[int, int]) -> Pinhole:
-        """Return the pinhole of a design's camera, without any refraction in front of its lens.
-
-        Args:
-            camera: the camera, whose field of view is that across the picture. A distortion of
-                another kind than Brown-Conrady is left out.
-            resolution: width and height, pixels.
+        """Return the pinhole of a design's camera, without any refraction in front of its lens, in
+        a picture of a width and height in pixels. A distortion of another kind than Brown-Conrady
+        is left out.
         """
         right, up, forward = camera.axes()
         rotation = np.array([right, -up, forward])
@@ -114,11 +106,8 @@ class Pinhole:
         return self.focal * bent + self.centre, seen[:, 2]
 
     def errors(self, points: FloatArray, pixels: FloatArray) -> dict[str, float]:
-        """Return the root-mean-square and largest errors, in pixels and in mm at the points.
-
-        Args:
-            points: points (n, 3), mm.
-            pixels: columns and rows (n, 2) at which the points are seen.
+        """Return the root-mean-square and largest errors, in pixels and in mm, of points (n, 3),
+        mm, that are seen at columns and rows (n, 2).
         """
         seen, along = self.project(points)
         apart = np.linalg.norm(seen - pixels, axis=1)
@@ -143,12 +132,8 @@ class Pinhole:
 
 
 def fit_pinhole(start: Pinhole, points: FloatArray, pixels: FloatArray) -> Pinhole:
-    """Fit a pinhole camera to points and their pixels, by least squares of the distances in pixels.
-
-    Args:
-        start: initial camera.
-        points: (n, 3) points at more than one depth, mm.
-        pixels: (n, 2) columns and rows of the points.
+    """Fit a pinhole camera to points (n, 3), mm, at more than one depth, and their columns and rows
+    (n, 2), by least squares of the distances in pixels.
     """
     from scipy.optimize import least_squares
     from scipy.spatial.transform import Rotation
@@ -174,15 +159,12 @@ def fit_pinhole(start: Pinhole, points: FloatArray, pixels: FloatArray) -> Pinho
 
 
 def camera_model(camera: Camera, rays: ChiefRays) -> dict[str, Any]:
-    """Return the pinhole of the design and the fitted one, each with its errors, ready for JSON.
+    """Return the pinhole of the design and the fitted one, each with its errors, ready for JSON,
+    from chief rays without contacts.
 
-    Args:
-        rays: chief rays without contacts.
-
-    Returns:
-        "as_designed" and "fitted", and a "note" on a distortion that OpenCV's coefficients can't
-        state; None for a camera that no pinhole describes: a fisheye, a very wide view, or one that
-        sees part of the skin from behind, as over mirrors.
+    They are under "as_designed" and "fitted", and a "note" tells of a distortion that OpenCV's
+    coefficients can't state. Both are None for a camera that no pinhole describes: a fisheye, a
+    very wide view, or one that sees part of the skin from behind, as over mirrors.
     """
     height, width = rays.hit.shape
     pair = _seen(rays)

@@ -28,21 +28,15 @@ Mini, so that the picture includes the shading just outside the contact."""
 
 
 def rays_of_places(model: OpticalModel, resolution: tuple[int, int] | None = None) -> ChiefRays:
-    """Return chief rays of the untouched sensor, whose end points are the places of contacts.
-
-    Args:
-        resolution: (width, height), pixels, of the pictures that show the places, of which only the
-            aspect ratio matters; the camera's own by default.
+    """Return chief rays of the untouched sensor, whose end points are the places of contacts in
+    pictures of the shape of a resolution, the camera's own by default.
     """
     return model.chief_rays(model.design.camera.size_at(PLACES_ACROSS, resolution))
 
 
 def keeps_margin(mask: NDArray[np.bool_], margin: float) -> bool:
-    """Return whether a contact keeps a margin to the picture's edge.
-
-    Args:
-        mask: (h, w) mask of the contact.
-        margin: margin as a share of the width; 0 is always kept.
+    """Return whether a contact, of a mask (h, w), keeps a margin to the picture's edge, as a share
+    of its width; 0 is always kept.
     """
     return margin == 0.0 or not is_cut(mask, max(1, round(margin * mask.shape[1])))
 
@@ -60,11 +54,8 @@ class Places:
     """The places of a sensing surface that the camera sees, drawn uniformly by area."""
 
     def __init__(self, rays: ChiefRays, areas: FloatArray) -> None:
-        """Collect the places.
-
-        Args:
-            rays: chief rays without contacts.
-            areas: (h, w) area (mm^2) of surface that each pixel sees.
+        """Collect the places of chief rays without contacts, each of which sees an area (mm^2) of
+        surface.
         """
         weights = np.where(rays.hit, areas, 0.0)
         rows, columns = np.nonzero(weights > 0)

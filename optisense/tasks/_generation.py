@@ -197,11 +197,8 @@ class _Maker:
         self._failures.add({"index": index, "reason": reason})
 
     def _why_not(self, drawn: DrawnContact) -> str:
-        """Return the reason why a contact makes no sample, from its chief rays; empty if it makes
-        one.
-
-        Raises:
-            ContactError: the contact cannot be pressed in there.
+        """Return the reason why a contact makes no sample, from its chief rays, or an empty text;
+        ContactError is raised if it cannot be pressed in there.
         """
         mask = self._touched(drawn.contact)
         if mask.sum() < LEAST_PIXELS:
@@ -218,9 +215,7 @@ class _Maker:
 
     def _fits(self, indenter: Indenter) -> bool:
         """Return whether the view contains an indenter with its margin, pressed upright in the
-        middle.
-
-        The picture's edge cuts a larger indenter at every place.
+        middle; the picture's edge cuts a larger one at every place.
         """
         draw = self._settings.contacts
         x, y, z = self._places.middle.tolist()

@@ -147,14 +147,9 @@ def central(length: int, part: float) -> slice:
 
 
 def plane_contact(model: OpticalModel, angle_x: float, angle_y: float, depth: float) -> Contact:
-    """Return a plane over the camera's whole view.
-
-    Args:
-        angle_x, angle_y: rotation (degrees) about the u axis, then the perpendicular one.
-        depth: depth (mm) of the plane below the middle of the surface.
-
-    Raises:
-        ContactError: the plane reaches the bottom of the gel.
+    """Return a plane over the camera's whole view, at a depth (mm) below the middle of the surface
+    and at angles (degrees) about the u axis, then the perpendicular one; ContactError is raised if
+    it reaches the bottom of the gel.
     """
     surface = model.surface
     spot = surface.point_at(0.0, 0.0)

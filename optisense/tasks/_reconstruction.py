@@ -231,14 +231,8 @@ def reconstruct(
 def reconstruct_one(
     sensor: CalibratedSensor, contact: Contact, number: int = 0, name: str = "the object"
 ) -> Reconstruction:
-    """Press an object into a calibrated sensor and reconstruct it.
-
-    Args:
-        number: number of the picture, for its noise.
-        name: name of the object, for messages.
-
-    Raises:
-        TaskError: the camera does not see the contact.
+    """Press an object into a calibrated sensor and reconstruct it, with the noise of a picture of
+    this number; TaskError is raised if the camera does not see the contact.
     """
     image, picture = sensor.take_picture(contact, number)
     # At the border of the view, a pixel may see the contact but not the untouched skin.

@@ -24,21 +24,15 @@ KEPT = "Free space on this disk or choose another folder; finished samples are k
 
 
 def write_whole(path: Path, writer: Callable[[Path], object]) -> None:
-    """Call `writer` to write a file under a temporary name beside `path`, then rename it.
-
-    Raises:
-        OutputError: the file cannot be written.
+    """Call `writer` to write a file under a temporary name beside `path`, then rename it; a file
+    that cannot be written raises OutputError.
     """
     with written_whole(path, "the results", KEPT) as temporary:
         writer(temporary)
 
 
 def read_object(path: Path) -> dict[str, Any]:
-    """Read a JSON file that holds an object.
-
-    Raises:
-        TaskError: the file is missing or holds no JSON object.
-    """
+    """Read a JSON object from a file; TaskError is raised if the file is missing or holds none."""
     values = read_json(path, TaskError)
     if not isinstance(values, dict):
         raise TaskError("this JSON file holds no object", where=str(path), hint=COPY_AGAIN)
@@ -81,11 +75,7 @@ class CsvTable:
         self.rows = read_table(path, TaskError)
 
     def add(self, row: Mapping[str, object]) -> None:
-        """Append a row completely or not at all.
-
-        Raises:
-            OutputError: the row cannot be written.
-        """
+        """Append a row completely or not at all; OutputError is raised if it cannot be written."""
         text = {name: _text(row[name]) for name in self.columns}
         before = self._file.tell()
         try:

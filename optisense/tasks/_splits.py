@@ -24,11 +24,8 @@ Cell = tuple[int, int]
 
 
 def cell_of(spot: Sequence[float], aspect: float) -> Cell:
-    """Return the cell of a position in the picture.
-
-    Args:
-        spot: position, as shares of the picture's width and height.
-        aspect: height of the picture over its width.
+    """Return the cell of a position, in shares of the picture's width and height, from the height
+    of the picture over its width.
     """
     return math.floor(CELLS * spot[0]), math.floor(CELLS * (spot[1] * aspect))
 
@@ -40,17 +37,12 @@ def split_of(
     cells: Collection[Cell],
     hold_out: tuple[str, ...] = (),
 ) -> str:
-    """Return the split of a press.
+    """Return the split of a press of an indenter in a cell, of all cells in which the camera sees
+    skin; indenters that are held out are in the test split only.
 
     The picture is divided into cells, and all presses in a cell are in one split; a press may still
     have one of another split beside it, across the border of its cell. The split depends on the
     arguments only, so that further samples do not change those of existing ones.
-
-    Args:
-        indenter: text of the indenter, as given.
-        cell: cell of the place.
-        cells: all cells in which the camera sees skin.
-        hold_out: indenters that are in the test split only.
     """
     if indenter in hold_out:
         return TEST

@@ -112,10 +112,8 @@ class _Skin:
     def press(
         self, indenter: ObjectIndenter, depth: float, rotation: float, rng: np.random.Generator
     ) -> list[Contact]:
-        """Return a contact with each of the models, at one place far from earlier ones.
-
-        Raises:
-            ContactError: the gel is too thin for the depth at all places that were tried.
+        """Return a contact with each of the models, at one place far from earlier ones;
+        ContactError is raised if the gel is too thin for the depth at all places that were tried.
         """
         for attempt in range(ATTEMPTS):
             point = _far_from(
@@ -139,16 +137,11 @@ def choose_presses(
     seed: int,
     resolution: tuple[int, int] | None = None,
 ) -> UnseenPresses:
-    """Choose places, depths and rotations of objects on the skin that either sensor's camera sees.
+    """Choose places, depths and rotations of objects, keys of `OBJECTS`, on the skin that either
+    sensor's camera sees, with a number of places for each object.
 
-    Args:
-        objects: keys of `OBJECTS`.
-        places: number of presses of each object.
-        resolution: (width, height), pixels, of the pictures; only its aspect ratio matters. If it
-            is None, that of each camera is taken.
-
-    Raises:
-        TaskError: the cameras see nothing, or there is no place for an object.
+    Only the aspect ratio of the resolution matters; if it is None, that of each camera is taken.
+    TaskError is raised if the cameras see nothing, or if there is no place for an object.
     """
     alike = _have_one_skin(models)
     groups: list[Sequence[OpticalModel]] = [models] if alike else [[each] for each in models]
@@ -196,10 +189,8 @@ def _one(skins: Sequence[_Skin], indenter: ObjectIndenter, seed: list[int]) -> U
 def _pressed(
     model: OpticalModel, indenter: ObjectIndenter, point: FloatArray, depth: float, rotation: float
 ) -> Contact:
-    """Return a contact at the place of a sensor's skin that is nearest to a point (mm).
-
-    Raises:
-        ContactError: the gel there is too thin for the depth.
+    """Return a contact at the place of a sensor's skin that is nearest to a point (mm);
+    ContactError is raised if the gel there is too thin for the depth.
     """
     x, y, z = model.surface.nearest(point).point.tolist()
     # The place is accepted if the object could also be pressed in deeper, by a factor of 1 /
@@ -244,10 +235,8 @@ def _seen_places(
 
 
 def _away_from_the_border(points: FloatArray, areas: FloatArray) -> FloatArray:
-    """Return areas (h, w) of pixels, set to 0 near the border of the view; unchanged if none would
-    remain.
-
-    ``points`` are the points (h, w, 3), mm, that the pixels see.
+    """Return areas (h, w) of pixels that see points (h, w, 3), mm, set to 0 near the border of the
+    view; unchanged if none would remain.
     """
     seen = areas > 0.0
     border = seen & ~binary_erosion(seen)

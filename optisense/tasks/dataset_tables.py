@@ -90,10 +90,8 @@ class _Info(BaseModel):
 
 
 def read_info(folder: Path) -> dict[str, Any]:
-    """Return the content of `dataset.json`.
-
-    Raises:
-        TaskError: the file is missing, damaged, or of another release; the message says which.
+    """Return the content of `dataset.json`; TaskError says if it is missing, damaged, or of another
+    release.
     """
     path = folder / INFO
     info = read_object(path)
@@ -113,9 +111,7 @@ def read_info(folder: Path) -> dict[str, Any]:
 
 def read_labels(folder: Path) -> list[dict[str, Any]]:
     """Return the rows of `LABELS` with converted numbers; empty if there is no such file yet.
-
-    Raises:
-        TaskError: the table or one of its rows cannot be read; the message names the line.
+    TaskError names the line that cannot be read.
     """
     labels: dict[int, dict[str, Any]] = {}
     for where, given in _rows(folder / LABELS):
@@ -134,10 +130,8 @@ def read_labels(folder: Path) -> list[dict[str, Any]]:
 
 
 def read_failures(folder: Path) -> list[dict[str, str]]:
-    """Return the rows of `FAILURES`; empty if there is no such file yet.
-
-    Raises:
-        TaskError: the table or one of its rows cannot be read; the message names the line.
+    """Return the rows of `FAILURES`; empty if there is no such file yet. TaskError names the line
+    that cannot be read.
     """
     rows = _rows(folder / FAILURES)
     for where, row in rows:

@@ -44,10 +44,7 @@ def draw_perception(result: PerceptionResult) -> Figure:
 
 def draw_reconstruction(result: ReconstructionResult, axes: FloatArray) -> Figure:
     """Draw for each object the picture, true and read normals, their angle, and true and read
-    depth.
-
-    Args:
-        axes: (3, 3) rows: image right, image up and viewing direction, in the design's frame.
+    depth. The axes (3, 3) are image right, image up and viewing direction, in the design's frame.
     """
     rows = len(result.objects)
     titles = ("picture", "true normals", "read normals", "normal error (°)")

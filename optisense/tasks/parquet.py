@@ -131,10 +131,8 @@ def _write(
 
 
 def features_of(height: int, width: int) -> dict[str, Any]:
-    """Return the types of the columns, as Hugging Face's `datasets` writes them.
-
-    Args:
-        height, width: size of the pictures, pixels.
+    """Return the types of the columns, as Hugging Face's `datasets` writes them, for pictures of a
+    size in pixels.
     """
     found: dict[str, Any] = {"image": {"_type": "Image"}}
     for name, (kind, channels) in ARRAYS.items():

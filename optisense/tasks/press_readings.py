@@ -95,12 +95,9 @@ def read_press(
     keeps: bool,
     kept: KeptArrays = NOTHING_KEPT,
 ) -> PressReading:
-    """Press something into a calibrated sensor and read it.
-
-    Args:
-        areas: (h, w) area (mm^2) of skin that each of its pixels sees.
-        number: number of the picture, for its noise.
-        keeps: whether the pictures are kept.
+    """Press something into a calibrated sensor and read it by all of its readers. The areas (h, w)
+    are those of skin, mm^2, that its pixels see, the number is that of the picture, for its noise,
+    and `keeps` says whether pictures are kept.
     """
     return PressReading.from_arrays(
         kept.arrays(
@@ -149,14 +146,10 @@ def whole_errors(
     pair: tuple[PressReading, ...], trees: Sequence[cKDTree], reach: float
 ) -> tuple[list[FloatArray], list[FloatArray]]:
     """Return the errors of normals (degrees) and of depth (mm) over the whole contact, (readers,)
-    for each sensor.
+    for each of two sensors, one of which sees the contact.
 
-    Parts that only the other camera sees count as read flat.
-
-    Args:
-        pair: the readings of the same press by two sensors, one of which sees the contact.
-        trees: search trees of the points (mm) of the skin that each camera sees.
-        reach: largest distance (mm) from one of these points at which a place counts as seen.
+    Parts that only the other camera sees count as read flat: those farther than `reach` (mm) from
+    the points of the skin that a camera sees, which are in its search tree.
     """
     normals: list[FloatArray] = []
     depths: list[FloatArray] = []

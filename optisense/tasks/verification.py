@@ -327,13 +327,11 @@ def _check_views(
     presses: Sequence[UnseenPress],
     reading: ReconstructionSettings,
 ) -> None:
-    """Check by rays, before anything is rendered, that a camera sees the contact of each press.
+    """Check by rays, before anything is rendered, that a camera sees the contact of each press, and
+    raise TaskError if neither does.
 
     The shape of an elastic skin takes a second to solve for, so it is only used where the overlap
     of object and skin is in neither picture.
-
-    Raises:
-        TaskError: neither camera sees a contact.
     """
     from optisense.optics.transport.chief_rays import pixel_areas
 
@@ -385,11 +383,8 @@ def _read_all(
     kept: KeptArrays,
     others: Sequence[PressReading] | None,
 ) -> list[PressReading]:
-    """Return a sensor's readings of all presses, with pictures at the first place of each
-    object; ``others`` are the readings of the other sensor.
-
-    Raises:
-        TaskError: neither camera sees a contact.
+    """Return a sensor's readings of all presses, with pictures at the first place of each object.
+    With the readings of the other sensor, TaskError is raised if neither camera sees a contact.
     """
     found = []
     for number, press in enumerate(presses):
