@@ -1,30 +1,36 @@
-"""Evaluation of units, one after the other or in several processes."""
+"""Evaluation of units, one after the other or in several processes.
+
+A process computes a share of units in a row, to reuse scenes and light. A sensor with other
+dimensions needs a new scene, and another coating or seed needs new photons; other contacts,
+pictures and scores under the same light need neither.
+"""
 
 from __future__ import annotations
 
-import queue
-from collections.abc import Callable, Sequence
-from concurrent.futures import Future
+import json
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import FIRST_COMPLETED, wait
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.json_values import json_ready
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.executors import ProcessPool
-from paper.errors import ExperimentError
-from paper.shares import shares
-from paper.unit import Record, Unit, kept, work_out
+from paper.unit import ExperimentError, Record, Unit, kept, work_out
 
 ShowUnits = Callable[[int, int, str], None]
 """Progress callback: takes the number of finished units, of all units, and the label of one."""
 
 TICK = 0.2
 """Longest wait for a worker process before Ctrl-C is noticed, s; users notice no delay of 0.2 s."""
+LEAST_UNITS = 6
+"""Smallest number of units of a share, if so many have the same sensor.
 
-
-Finished = queue.SimpleQueue[tuple[list[Unit], Future[Outcome]]]
-"""Queue of the shares of units that worker processes have finished."""
+Smaller shares build the sensor again more often. Larger ones leave processes idle at the end and
+make the progress line jump.
+"""
 
 
 class Bench:
@@ -78,34 +84,21 @@ class Bench:
 
     def _by_pool(self, together: Sequence[list[Unit]], done: int, count: int) -> int:
         """Compute shares of units in worker processes; return the number of finished units."""
-        finished: Finished = queue.SimpleQueue()
-
-        def hand_over(share: list[Unit], future: Future[Outcome]) -> None:
-            finished.put((share, future))
-
         worker = _Worker(together, self.folder)
         with ProcessPool(worker, min(self.workers, len(together))) as pool:
-            for number, share in enumerate(together):
-                future = pool.submit(np.array([float(number)]), 0)
-                future.add_done_callback(lambda f, share=share: hand_over(share, f))  # type: ignore[misc]
-            for _ in together:
-                share, future = self._wait(finished)
-                outcome = future.result()
-                if outcome.failure is not None:
-                    names = " or ".join(unit.label for unit in share)
-                    raise ExperimentError(f"{names} can't be computed: {outcome.failure}")
-                done += len(share)
-                self._show(done, count, share[-1].label)
+            running = {
+                pool.submit(np.array([float(number)]), 0): share
+                for number, share in enumerate(together)
+            }
+            while running:
+                for future in wait(running, TICK, FIRST_COMPLETED).done:
+                    share, outcome = running.pop(future), future.result()
+                    if outcome.failure is not None:
+                        names = " or ".join(unit.label for unit in share)
+                        raise ExperimentError(f"{names} can't be computed: {outcome.failure}")
+                    done += len(share)
+                    self._show(done, count, share[-1].label)
         return done
-
-    @staticmethod
-    def _wait(finished: Finished) -> tuple[list[Unit], Future[Outcome]]:
-        """Return the next finished share; Ctrl-C interrupts the wait."""
-        while True:
-            try:
-                return finished.get(timeout=TICK)
-            except queue.Empty:
-                continue
 
     def _kept(self, unit: Unit) -> Record:
         """Return the kept result of a unit that was computed.
@@ -139,3 +132,39 @@ class _Worker:
             if kept(unit, self._folder) is None:  # a process that died may have written it
                 work_out(unit, self._folder)
         return Outcome({})
+
+
+def shares(units: Iterable[Unit]) -> list[list[Unit]]:
+    """Return units in groups: those with the same light together, then those of the same sensor.
+
+    The groups are in the order in which sensors and lights first occur.
+    """
+    by_sensor: dict[str, dict[str, list[Unit]]] = {}
+    for unit in units:
+        by_sensor.setdefault(_sensor(unit), {}).setdefault(_light(unit), []).append(unit)
+    found: list[list[Unit]] = []
+    for lights in by_sensor.values():
+        share: list[Unit] = []
+        for group in lights.values():
+            share += group
+            if len(share) >= LEAST_UNITS:
+                found.append(share)
+                share = []
+        if share:
+            found.append(share)
+    return found
+
+
+def _sensor(unit: Unit) -> str:
+    """Return a text that is the same for units with the same scene; a search has one of its own."""
+    design = unit.inputs.get("design")
+    if design is None or "method" in unit.inputs:
+        return unit.key
+    return json.dumps(json_ready([design["sensor"], design["dimensions"]]), sort_keys=True)
+
+
+def _light(unit: Unit) -> str:
+    """Return a text that is the same for units that trace the same photons."""
+    asked = {**unit.inputs, **unit.inputs.get("settings", {})}
+    light = [asked.get("design"), asked.get("photons"), asked.get("seed")]
+    return json.dumps(json_ready(light), sort_keys=True)

@@ -19,9 +19,8 @@ from optisense.search.study.settings import package_versions
 from optisense.writing import write_json, write_text, written_whole
 from paper.bench import Bench
 from paper.claims import Claim, Table
-from paper.errors import ExperimentError
 from paper.text import PICTURE, RESULT, TEXT, chapter
-from paper.unit import Record, Unit
+from paper.unit import ExperimentError, Record, Unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

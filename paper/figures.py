@@ -1,4 +1,4 @@
-"""Lines, bars and images of the experiments' figures."""
+"""Lines and images of the experiments' figures."""
 
 from __future__ import annotations
 
@@ -35,19 +35,6 @@ def line(
         capsize=3,
         markersize=4,
         linewidth=1.3,
-    )
-
-
-def bars(axes: Axes, values: Mapping[str, Spread], colour: str = BLUE) -> None:
-    """Draw one bar for each name, with its standard deviation."""
-    there = {name: each for name, each in values.items() if each["mean"] is not None}
-    axes.bar(
-        list(there),
-        [each["mean"] for each in there.values()],
-        yerr=[each["standard_deviation"] or 0.0 for each in there.values()],
-        color=colour,
-        capsize=3,
-        width=0.6,
     )
 
 

@@ -13,8 +13,8 @@ from paper import (
     svelte_mirror,
     tasks,
 )
-from paper.errors import ExperimentError
 from paper.experiment import Experiment
+from paper.unit import ExperimentError
 
 EXPERIMENTS: dict[str, Experiment] = {
     module.EXPERIMENT.name: module.EXPERIMENT

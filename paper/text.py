@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from optisense.writing import write_text
 from paper.claims import AGREES, DISAGREES, OPEN
-from paper.errors import ExperimentError
+from paper.unit import ExperimentError
 
 if TYPE_CHECKING:
     from paper.experiment import Experiment

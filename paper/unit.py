@@ -23,10 +23,13 @@ from optisense.errors import OptiSenseError, OutputError, SetupError
 from optisense.json_values import json_ready
 from optisense.search.study.settings import package_versions
 from optisense.writing import inside, write_json, written_together
-from paper.errors import ExperimentError
 
 UNITS = "units"
 """Name of the folder of the units' results, within the folder of all results."""
+
+
+class ExperimentError(OptiSenseError):
+    """An experiment that is unknown, or whose results can't be read."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +95,11 @@ class Record:
     seconds: float
     processor_seconds: float
     pictures_file: Path | None = None
+
+    def score(self, name: str) -> float | None:
+        """Return the score of an objective; None if it has none."""
+        found: float | None = self.values.get("scores", {}).get(name)
+        return found
 
     def pictures(self) -> dict[str, NDArray[np.uint8]]:
         """Return the pictures (h, w, 3) uint8 by name."""

@@ -113,7 +113,10 @@ class ColourNetwork:
         return read
 
 
-METHODS = {"network": ColourNetwork, "table": ColourTable}
+METHODS: dict[str, type[ColourNetwork | ColourTable]] = {
+    "network": ColourNetwork,
+    "table": ColourTable,
+}
 """Kinds of readers by the name of their method."""
 
 

@@ -27,7 +27,7 @@ from paper.evaluations import (
 )
 from paper.gelsight360 import every_colouring
 from paper.objects import OBJECTS
-from paper.timing import image_times
+from paper.speed import image_times
 
 IMAGES = {"resolution": [160, 120], "photons": 60_000, "seed": 3}
 COARSE = {"resolution": [160, 120], "photons": 60_000, "places": [[0.0, 0.0], [4.0, 3.0]]}

@@ -13,12 +13,12 @@ import pytest
 
 from optisense.json_values import json_ready
 from paper import EXPERIMENTS, Experiment, Finding, Record, find, write_page
-from paper.errors import ExperimentError
 from paper.experiment import gaps, write
 from paper.robustness import AS_ASSUMED, with_verdicts
 from paper.robustness_questions import CONCLUSIONS
 from paper.spread import spread
 from paper.text import PICTURE, RESULT, TEXT
+from paper.unit import ExperimentError
 
 Answered = Callable[..., tuple[Finding, list[Record]]]
 """See conftest.py."""

@@ -6,8 +6,8 @@ import itertools
 from typing import Any
 
 from paper import EXPERIMENTS, Unit
+from paper.bench import LEAST_UNITS, shares
 from paper.evaluations import perception, picture, scores, searched, sensor
-from paper.shares import LEAST_UNITS, shares
 
 
 def score(name: str, seed: int, change: dict[str, Any] | None = None, **dimensions: float) -> Unit:

@@ -16,9 +16,8 @@ from warm_python import programs
 
 from optisense.errors import ObjectiveError, SetupError
 from paper import Bench, Found, Unit
-from paper.errors import ExperimentError
 from paper.evaluations import scores, sensor
-from paper.unit import UNITS, kept
+from paper.unit import UNITS, ExperimentError, kept
 
 asked: list[Any] = []
 stop_at: set[Any] = set()
