@@ -8,7 +8,7 @@ sensor, such that results do not depend on the units before.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,7 +22,7 @@ from optisense.mechanics import CONFORMING
 from optisense.objectives import Evaluation, Score, Settings, evaluate
 from optisense.search.evaluation.models import ModelCache
 from optisense.sensors import SENSORS
-from paper.unit import Found
+from paper.unit import Found, Unit
 
 if TYPE_CHECKING:
     from optisense.optics import ChiefRays, OpticalModel
@@ -50,6 +50,12 @@ def sensor(name: str, change: Plain | None = None, **dimensions: Any) -> dict[st
         dimensions: arguments of the sensor's builder.
     """
     return {"sensor": name, "dimensions": dimensions, "change": dict(change or {})}
+
+
+def score_unit(design: Plain, objectives: Iterable[str], settings: Plain, label: str) -> Unit:
+    """Return the unit of scores of a design."""
+    inputs = {"design": design, "objectives": list(objectives), "settings": settings}
+    return Unit(scores, inputs, label)
 
 
 def design_of(plain: Plain) -> SensorDesign:

@@ -9,11 +9,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from paper.claims import Claim, Table
-from paper.evaluations import NINE, picture, scores, sensor
+from paper.evaluations import NINE, picture, score_unit, sensor
 from paper.experiment import Experiment, Finding, Pictures, Steps, Values
 from paper.figures import COLOURS, finish, image, line
-from paper.mini_shapes import OBJECTIVES, best_text
-from paper.spread import best, best_satisfies, number, shown, spread
+from paper.mini_shapes import OBJECTIVES, best_claim
+from paper.spread import best, best_satisfies, number, shown, spread, spread_of
 from paper.unit import Unit
 
 if TYPE_CHECKING:
@@ -46,14 +46,8 @@ def steps(settings: Values) -> Steps:
         },
     }
     scored = [
-        Unit(
-            scores,
-            {
-                "design": sensor(SENSOR, change, light_design=design),
-                "objectives": list(OBJECTIVES),
-                "settings": {**images, "seed": seed},
-            },
-            label,
+        score_unit(
+            sensor(SENSOR, change, light_design=design), OBJECTIVES, {**images, "seed": seed}, label
         )
         for label, (design, change, seed) in asked.items()
     ]
@@ -72,13 +66,13 @@ def steps(settings: Values) -> Steps:
     answers = iter(records)
     by_design: Values = {}
     for design in DESIGNS:
-        rows = [next(answers).values.get("scores", {}) for _ in seeds]
-        by_design[design] = {name: spread([row.get(name) for row in rows]) for name in OBJECTIVES}
+        rows = [next(answers) for _ in seeds]
+        by_design[design] = {name: spread_of(name, rows) for name in OBJECTIVES}
     by_coating: Values = {name: {} for name in OBJECTIVES}
     for value in settings["specularities"]:
-        rows = [next(answers).values.get("scores", {}) for _ in seeds]
+        rows = [next(answers) for _ in seeds]
         for name in OBJECTIVES:
-            by_coating[name][f"{value:g}"] = spread([row.get(name) for row in rows])
+            by_coating[name][f"{value:g}"] = spread_of(name, rows)
     pictures: Pictures = {}
     for name, (_, where) in contacts.items():
         rows = [next(answers) for _ in (seeds if where == NINE else [0])]
@@ -107,8 +101,7 @@ def claims(numbers: Values) -> list[Claim]:
         )
     ]
     for name, title in OBJECTIVES.items():
-        column = {design: designs[design][name] for design in DESIGNS}
-        found.append(third_is_best(column, title))
+        found.append(third_is_best({each: designs[each][name] for each in DESIGNS}, title))
     for name, title in OBJECTIVES.items():
         found.append(coating_is_dull(numbers["coatings"][name], title))
     return found
@@ -116,11 +109,10 @@ def claims(numbers: Values) -> list[Claim]:
 
 def coating_is_dull(column: Values, title: str) -> Claim:
     """Return the paper's statement on the best coating, with its verdict from scores."""
-    top, alike = best(column)
-    return Claim(
+    return best_claim(
         f"A specularity below {MOST_SPECULAR:g} is best ({title}).",
-        best_text(column, top, alike),
-        best_satisfies(alike, lambda value: float(value) < MOST_SPECULAR),
+        column,
+        lambda value: float(value) < MOST_SPECULAR,
         WHY_COATING,
     )
 

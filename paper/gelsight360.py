@@ -12,18 +12,12 @@ from typing import TYPE_CHECKING, Any
 from optisense.objectives.normdiff import LEAST_PIXELS as LEAST_OF_NORMDIFF
 from optisense.objectives.rgb2normal import LEAST_PIXELS as LEAST_OF_RGB2NORMAL
 from paper.claims import Table
-from paper.evaluations import (
-    relit_scores,
-    scores,
-    searched,
-    sensor,
-    variants_of_score,
-)
+from paper.evaluations import relit_scores, score_unit, searched, sensor, variants_of_score
 from paper.experiment import Experiment, Finding, Pictures, Steps, Values
 from paper.figures import COLOURS, finish, line
 from paper.gelsight360_claims import LITTLE_NOISE, PAPER, claims, papers_order
 from paper.mini_shapes import OBJECTIVES
-from paper.spread import number, shown, spread
+from paper.spread import number, shown, spread, spread_of
 from paper.unit import Record, Unit
 
 if TYPE_CHECKING:
@@ -145,13 +139,10 @@ def steps(settings: Values) -> Steps:
     if not settings["all_photons"]:
         everything = []
     tips = [
-        Unit(
-            scores,
-            {
-                "design": sensor(SENSOR, tip_design=float(tip)),
-                "objectives": ["2to3pw"],
-                "settings": {"ray_resolution": ray_grid(settings, seed), **jump},
-            },
+        score_unit(
+            sensor(SENSOR, tip_design=float(tip)),
+            ["2to3pw"],
+            {"ray_resolution": ray_grid(settings, seed), **jump},
             f"tip {tip}, grid {seed}",
         )
         for tip in settings["tips"]
@@ -159,17 +150,10 @@ def steps(settings: Values) -> Steps:
         for seed in seeds
     ]
     resins = [
-        Unit(
-            scores,
-            {
-                "design": sensor(SENSOR, resin_design=float(resin)),
-                "objectives": goals,
-                "settings": {
-                    **judged,
-                    "resolution": settings["resin_resolution"],
-                    "seed": seed,
-                },
-            },
+        score_unit(
+            sensor(SENSOR, resin_design=float(resin)),
+            goals,
+            {**judged, "resolution": settings["resin_resolution"], "seed": seed},
             f"resin {resin}, seed {seed}",
         )
         for resin in settings["resins"]
@@ -187,21 +171,18 @@ def steps(settings: Values) -> Steps:
         "least_pixels": settings["least_pixels"],
     }
     for resin in settings["resins"]:
-        found = [next(answers).values.get("scores", {}) for _ in seeds]
+        found = [next(answers) for _ in seeds]
         for name in goals:
-            numbers["resins"][name][str(resin)] = spread([each.get(name) for each in found])
+            numbers["resins"][name][str(resin)] = spread_of(name, found)
     numbers["why"] = {}
     for name in settings["why"]:
-        record = next(answers)
-        numbers["why"][name] = {
-            "scores": record.values.get("scores", {}),
-            "pixels": min(record.values.get("pixels") or [0]),
-        }
+        values = next(answers).values
+        pixels = min(values.get("pixels") or [0])
+        numbers["why"][name] = {"scores": values.get("scores", {}), "pixels": pixels}
     numbers["tips"], numbers["tips_with_leaps"] = {}, {}
     for tip in settings["tips"]:
         for column in ("tips", "tips_with_leaps"):
-            found = [next(answers).values.get("scores", {}).get("2to3pw") for _ in seeds]
-            numbers[column][str(tip)] = spread(found)
+            numbers[column][str(tip)] = spread_of("2to3pw", [next(answers) for _ in seeds])
     return Finding(numbers)
 
 

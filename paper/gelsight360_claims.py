@@ -51,10 +51,7 @@ def colour_claims(colourings: Values) -> list[Claim]:
     found.append(
         Claim(
             "RGBRGBRG has the best NormDiff of the five.",
-            "no scores"
-            if top is None
-            else f"{top} ({shown(column[top], 4)}); not significantly different: "
-            f"{_all_but(alike, top)}; with {LITTLE_NOISE}: {little}",
+            _best_text(column, digits=4) + (f"; with {LITTLE_NOISE}: {little}" if top else ""),
             best_satisfies(alike, lambda letters: letters == "RGBRGBRG"),
             WHY_NORMDIFF,
         )
@@ -75,8 +72,13 @@ def colour_claims(colourings: Values) -> list[Claim]:
     return found
 
 
-def _all_but(names: list[str], top: str) -> str:
-    return ", ".join(name for name in names if name != top) or "none"
+def _best_text(column: Values, what: str = "", digits: int = 3) -> str:
+    """Return the best with its score, and what does not differ from it significantly."""
+    top, alike = best(column)
+    if top is None:
+        return "no scores"
+    others = ", ".join(name for name in alike if name != top) or "none"
+    return f"{what}{top} ({shown(column[top], digits)}); not significantly different: {others}"
 
 
 def _order(colourings: Values, name: str, title: str) -> Claim:
@@ -119,10 +121,7 @@ def _tips(tips: Values, with_leaps: Values) -> list[Claim]:
         Claim(
             f"Of the tips 0 (flat) to 10 (conical), {PAPERS_TIP} (or a neighbour) has the best "
             "2to3PW.",
-            "no scores"
-            if top is None
-            else f"tip {top} ({shown(tips[top])}); not significantly different: "
-            f"{_all_but(alike, top)}",
+            _best_text(tips, "tip "),
             best_satisfies(alike, lambda tip: abs(float(tip) - PAPERS_TIP) <= 1.0),
             "The shapes between the ends of the family are assumed, and so are the height and the "
             "width of the tip. 2to3PW depends on the uniformity over the whole image, so that the "
@@ -145,14 +144,11 @@ def _tips(tips: Values, with_leaps: Values) -> list[Claim]:
 
 
 def _resin(column: Values, title: str) -> Claim:
-    top, alike = best(column)
     return Claim(
         f"Of the resins 0 (even shell) to 10 (almost flat inside), {PAPERS_RESIN} is best "
         f"({title}).",
-        "no scores"
-        if top is None
-        else f"{top} ({shown(column[top])}); not significantly different: {_all_but(alike, top)}",
-        best_satisfies(alike, lambda resin: float(resin) == PAPERS_RESIN),
+        _best_text(column),
+        best_satisfies(best(column)[1], lambda resin: float(resin) == PAPERS_RESIN),
         "The thicknesses of gel and shell, the positions of the LEDs in the wall and the shapes "
         "between the ends of the family are assumed. The resin refracts the camera's view and the "
         "light only at the tip, and most of the nine places are on the wall.",

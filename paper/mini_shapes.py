@@ -6,13 +6,23 @@ balls of 1.5 mm over the specularity of the coating.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from paper.claims import Claim, Table
-from paper.evaluations import NINE, picture, scores, sensor
+from paper.evaluations import NINE, picture, score_unit, sensor
 from paper.experiment import Experiment, Finding, Pictures, Steps, Values
 from paper.figures import COLOURS, finish, image, line
-from paper.spread import Spread, best, best_satisfies, is_larger, number, shown, spread
+from paper.spread import (
+    Spread,
+    best,
+    best_satisfies,
+    is_larger,
+    number,
+    shown,
+    spread,
+    spread_of,
+)
 from paper.unit import Unit
 
 if TYPE_CHECKING:
@@ -35,22 +45,13 @@ SIMILAR = {"rgb2normal": 0.05, "normdiff": 0.1}
 similar; the paper shows it in a figure without numbers."""
 
 
-def score_units(
-    settings: Values, sensors: dict[str, str], change: dict[str, Any] | None = None
-) -> list[Unit]:
+def score_units(settings: Values, sensors: dict[str, str]) -> list[Unit]:
     """Return the units of scores of sensors at all specularities with all seeds."""
     return [
-        Unit(
-            scores,
-            {
-                "design": sensor(name, {**(change or {}), "coating.specularity": value}),
-                "objectives": list(OBJECTIVES),
-                "settings": {
-                    "resolution": settings["resolution"],
-                    "photons": settings["photons"],
-                    "seed": seed,
-                },
-            },
+        score_unit(
+            sensor(name, {"coating.specularity": value}),
+            OBJECTIVES,
+            {**{key: settings[key] for key in ("resolution", "photons")}, "seed": seed},
             f"{label}, specularity {value:g}, seed {seed}",
         )
         for label, name in sensors.items()
@@ -66,9 +67,9 @@ def curves(settings: Values, records: list[Any], sensors: dict[str, str]) -> Val
     for label in sensors:
         columns: Values = {name: {} for name in OBJECTIVES}
         for value in settings["specularities"]:
-            rows = [next(answers).values.get("scores", {}) for _ in range(settings["seeds"])]
+            rows = [next(answers) for _ in range(settings["seeds"])]
             for name in OBJECTIVES:
-                columns[name][f"{value:g}"] = spread([row.get(name) for row in rows])
+                columns[name][f"{value:g}"] = spread_of(name, rows)
         found[label] = columns
     return found
 
@@ -92,46 +93,35 @@ def steps(settings: Values) -> Steps:
     ]
     units = score_units(settings, SHAPES)
     records = yield [*units, *pictures]
-    shown_ones = dict(zip(SHAPES, records[len(units) :], strict=True))
-    return Finding(
-        {"scores": curves(settings, records[: len(units)], SHAPES)},
-        {
-            label: each.pictures()["picture"]
-            for label, each in shown_ones.items()
-            if each.pictures()
-        },
-    )
+    seen = {
+        label: each.pictures()["picture"]
+        for label, each in zip(SHAPES, records[len(units) :], strict=True)
+        if each.pictures()
+    }
+    return Finding({"scores": curves(settings, records[: len(units)], SHAPES)}, seen)
 
 
 def claims(numbers: Values) -> list[Claim]:
     """Return the paper's statements on the best coating of each shape, with verdicts."""
     found = []
     for name, title in OBJECTIVES.items():
-        found.append(_cylinder(numbers["scores"]["cylinder"][name], title))
-        found.append(_sphere(numbers["scores"]["sphere"][name], title))
+        found += [
+            best_claim(
+                f"On the cylinder, a specularity of about {CYLINDER_BEST:g} is best ({title}).",
+                numbers["scores"]["cylinder"][name],
+                lambda value: float(value) == CYLINDER_BEST,
+                WHY_COATING,
+            ),
+            best_claim(
+                f"On the sphere, a specularity of up to {SPHERE_MOST:g} is best ({title}).",
+                numbers["scores"]["sphere"][name],
+                lambda value: float(value) <= SPHERE_MOST,
+                WHY_COATING,
+            ),
+        ]
     for label in ("cylinder", "sphere"):
         found.append(_similar(numbers["scores"], label))
     return found
-
-
-def _cylinder(column: Values, title: str) -> Claim:
-    top, alike = best(column)
-    return Claim(
-        f"On the cylinder, a specularity of about {CYLINDER_BEST:g} is best ({title}).",
-        best_text(column, top, alike),
-        best_satisfies(alike, lambda value: float(value) == CYLINDER_BEST),
-        WHY_COATING,
-    )
-
-
-def _sphere(column: Values, title: str) -> Claim:
-    top, alike = best(column)
-    return Claim(
-        f"On the sphere, a specularity of up to {SPHERE_MOST:g} is best ({title}).",
-        best_text(column, top, alike),
-        best_satisfies(alike, lambda value: float(value) <= SPHERE_MOST),
-        WHY_COATING,
-    )
 
 
 def _similar(all_scores: Values, label: str) -> Claim:
@@ -157,13 +147,15 @@ def _of_best(column: Values) -> Spread | None:
     return None if top is None else column[top]
 
 
-def best_text(column: Values, top: str | None, alike: list[str]) -> str:
-    """Return a text such as ``best at 0.4 (0.81 ± 0.01); not significantly different: 0.3``."""
-    if top is None:
-        return "no scores"
-    others = ", ".join(value for value in alike if value != top)
-    more = f"; not significantly different: {others}" if others else ""
-    return f"best at {top} ({shown(column[top])}){more}"
+def best_claim(says: str, column: Values, holds_for: Callable[[str], bool], why: str) -> Claim:
+    """Return a statement on the best of several variants, with its verdict from their scores."""
+    top, alike = best(column)
+    here = "no scores"
+    if top is not None:
+        others = ", ".join(value for value in alike if value != top)
+        more = f"; not significantly different: {others}" if others else ""
+        here = f"best at {top} ({shown(column[top])}){more}"
+    return Claim(says, here, best_satisfies(alike, holds_for), why)
 
 
 WHY_COATING = (

@@ -6,13 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from paper import (
-    gelbelt_lights,
-    gelsight360,
-    gelsight360_claims,
-    svelte_mirror,
-)
-from paper.evaluations import NINE, picture, relit_scores, scores, sensor
+from paper import gelbelt_lights, gelsight360, gelsight360_claims, svelte_mirror
+from paper.evaluations import NINE, picture, relit_scores, score_unit, sensor
 from paper.experiment import Values
 from paper.mini_shapes import OBJECTIVES
 from paper.unit import Record, Unit
@@ -101,9 +96,7 @@ def _belt_margins(records: Sequence[Record], settings: Values) -> dict[str, floa
     third, second, bright, dark = records
     found = {f"belt {name}": _difference(third, second, name) for name in OBJECTIVES}
     lit = [record.values.get("radiance") for record in (bright, dark)]
-    found["belt light"] = (
-        None if lit[0] is None or lit[1] is None else gelbelt_lights.DARK - lit[1] / lit[0]
-    )
+    found["belt light"] = None if None in lit else gelbelt_lights.DARK - lit[1] / lit[0]
     return found
 
 
@@ -130,24 +123,18 @@ def _colour_units(dimensions: Dimensions, settings: Values, seed: int) -> list[U
 
 def _colour_margins(records: Sequence[Record], settings: Values) -> dict[str, float | None]:
     found = records[0].values.get("colourings", {})
-
-    def score(letters: str) -> float | None:
-        value = found.get(letters, {}).get("scores", {}).get("normdiff")
-        return None if value is None else float(value)
-
-    first, other = score(FOUND), score(ORIGINAL)
+    first, other = (
+        found.get(letters, {}).get("scores", {}).get("normdiff") for letters in (FOUND, ORIGINAL)
+    )
     return {"colours": None if first is None or other is None else first - other}
 
 
 def _tip_units(dimensions: Dimensions, settings: Values, seed: int) -> list[Unit]:
     return [
-        Unit(
-            scores,
-            {
-                "design": sensor("gelsight360", tip_design=float(tip), **dimensions),
-                "objectives": ["2to3pw"],
-                "settings": {"ray_resolution": gelsight360.ray_grid(settings, seed)},
-            },
+        score_unit(
+            sensor("gelsight360", tip_design=float(tip), **dimensions),
+            ["2to3pw"],
+            {"ray_resolution": gelsight360.ray_grid(settings, seed)},
             f"tip {tip}",
         )
         for tip in settings["tips"]
@@ -158,9 +145,9 @@ def _tip_margins(records: Sequence[Record], settings: Values) -> dict[str, float
     near: list[float] = []
     far: list[float] = []
     for tip, record in zip(settings["tips"], records, strict=True):
-        value = record.values.get("scores", {}).get("2to3pw")
+        value = record.score("2to3pw")
         if value is not None:
-            (near if abs(tip - gelsight360_claims.PAPERS_TIP) <= 1 else far).append(float(value))
+            (near if abs(tip - gelsight360_claims.PAPERS_TIP) <= 1 else far).append(value)
     return {"tip": max(near) - max(far) if near and far else None}
 
 
@@ -184,25 +171,13 @@ def _mirror_margins(records: Sequence[Record], settings: Values) -> dict[str, fl
 
 
 def _score(design: Values, settings: Values, seed: int, what: str) -> Unit:
-    return Unit(
-        scores,
-        {
-            "design": design,
-            "objectives": list(OBJECTIVES),
-            "settings": {
-                "resolution": settings["resolution"],
-                "photons": settings["photons"],
-                "seed": seed,
-                **({"depth": settings["depth"]} if "depth" in settings else {}),
-            },
-        },
-        f"{what}, seed {seed}",
-    )
+    images = {key: settings[key] for key in ("resolution", "photons", "depth") if key in settings}
+    return score_unit(design, OBJECTIVES, {**images, "seed": seed}, f"{what}, seed {seed}")
 
 
 def _difference(one: Record, other: Record, name: str) -> float | None:
-    values = [record.values.get("scores", {}).get(name) for record in (one, other)]
-    return None if None in values else float(values[0]) - float(values[1])
+    first, second = one.score(name), other.score(name)
+    return None if first is None or second is None else first - second
 
 
 QUESTIONS = (

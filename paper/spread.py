@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from optisense.objectives.score import deviation_of
+from paper.unit import Record
 
 CONFIDENCE = 0.95
 """Confidence from which on two values count as different (one-sided t test), the usual choice."""
@@ -26,6 +27,11 @@ def spread(values: Sequence[float | None]) -> Spread:
         "standard_deviation": deviation_of(there) if len(there) > 1 else None,
         "values": [None if v is None or not math.isfinite(v) else float(v) for v in values],
     }
+
+
+def spread_of(objective: str, records: Iterable[Record]) -> Spread:
+    """Return mean and standard deviation of the scores of an objective, see `spread`."""
+    return spread([record.score(objective) for record in records])
 
 
 def shown(found: Spread, digits: int = 3) -> str:

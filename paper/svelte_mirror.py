@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from paper.claims import Claim, Table
-from paper.evaluations import picture, scores, searched, sensor, stretch
+from paper.evaluations import picture, score_unit, searched, sensor, stretch
 from paper.experiment import Experiment, Finding, Pictures, Steps, Values
 from paper.figures import finish, image
-from paper.spread import Spread, shown, spread
+from paper.spread import Spread, shown, spread, spread_of
 from paper.unit import Record, Unit
 
 if TYPE_CHECKING:
@@ -77,13 +77,10 @@ def steps(settings: Values) -> Steps:
             if record.failure is None:
                 mirrors[f"{method}, seed {seed}"] = sensor(SENSOR, {CAGE: record.values["values"]})
     fine = [
-        Unit(
-            scores,
-            {
-                "design": design,
-                "objectives": ["aoap"],
-                "settings": {"ray_resolution": settings["shown_resolution"]},
-            },
+        score_unit(
+            design,
+            ["aoap"],
+            {"ray_resolution": settings["shown_resolution"]},
             f"{name} at full resolution",
         )
         for name, design in mirrors.items()
@@ -108,13 +105,12 @@ def steps(settings: Values) -> Steps:
                 "contacts": [contact],
                 "resolution": settings["resolution"],
                 "photons": settings["photons"],
-                "seed": seed,
+                "seed": 0,
             },
-            f"{thing} {when}, seed {seed}",
+            f"{thing} {when}, seed 0",
         )
         for when, design in seen.items()
         for thing, contact in settings["contacts"].items()
-        for seed in [0]
     ]
     drawn = yield pictures
     return Finding(
@@ -129,8 +125,8 @@ def steps(settings: Values) -> Steps:
 
 def _best_of(scored: dict[str, Record]) -> str:
     def value(name: str) -> float:
-        found = scored[name].values.get("scores", {}).get("aoap")
-        return -1.0 if found is None else float(found)
+        found = scored[name].score("aoap")
+        return -1.0 if found is None else found
 
     return max(scored, key=value)
 
@@ -138,10 +134,8 @@ def _best_of(scored: dict[str, Record]) -> str:
 def _numbers(
     by_method: dict[str, list[Record]], scored: dict[str, Record], stretched: dict[str, Record]
 ) -> Values:
-    def of(names: list[str], part: str | None = None) -> Spread:
+    def of(names: list[str], part: str) -> Spread:
         rows = [scored[name].values for name in names]
-        if part is None:
-            return spread([row.get("scores", {}).get("aoap") for row in rows])
         return spread([row.get("parts", {}).get("aoap", {}).get(part) for row in rows])
 
     groups = {
@@ -151,7 +145,7 @@ def _numbers(
     found: Values = {
         "mirrors": {
             name: {
-                "aoap": of(names),
+                "aoap": spread_of("aoap", [scored[name] for name in names]),
                 "coverage": of(names, "coverage"),
                 "straight": of(names, "mean_cosine_of_rays_that_arrive"),
                 "seen": of(names, "pixels_that_see_the_surface"),
