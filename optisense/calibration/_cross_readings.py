@@ -37,6 +37,8 @@ from optisense.reading.lookup import Pixels, tilts_to_normals
 from optisense.reading.tilts import angles_between
 
 if TYPE_CHECKING:
+    from sklearn.pipeline import Pipeline
+
     from optisense.geometry import Contact
     from optisense.optics import ChiefRays, OpticalModel
 
@@ -136,39 +138,33 @@ def cross_readings(
     shown = _pixels_of(
         [noisy(picture) for picture in pictures.presses], noisy(pictures.background), balls
     )
-    of_model, of_photographs = _Reader(shown, balls), _Reader(real, balls)
+    of_model, of_photographs = _reader(shown, balls), _reader(real, balls)
     found = []
     for index, (press, ball) in enumerate(zip(photographs.presses, balls, strict=True)):
-        forth = _judged(of_model.normals(real[index]), ball)
-        back = _judged(of_photographs.normals(shown[index]), ball)
+        forth = _judged(of_model, real[index], ball)
+        back = _judged(of_photographs, shown[index], ball)
         alone: tuple[float | None, float | None] = None, None
         if len(balls) >= FEWEST_ALONE:
-            others = _Reader(real[:index] + real[index + 1 :], balls[:index] + balls[index + 1 :])
-            alone = _judged(others.normals(real[index]), ball)
+            others = _reader(real[:index] + real[index + 1 :], balls[:index] + balls[index + 1 :])
+            alone = _judged(others, real[index], ball)
         found.append(CrossReading(press.name, *forth, *back, *alone))
     return tuple(found)
 
 
-class _Reader:
-    """Polynomial that maps changes of colour and places to tilts, fitted by ridge regression; its
-    variables and its terms are standardised.
+def _reader(known: Sequence[Pixels], balls: Sequence[_Ball]) -> Pipeline:
+    """Return a polynomial that maps changes of colour and places to tilts, fitted by ridge
+    regression; its variables and its terms are standardised.
     """
+    from sklearn.linear_model import Ridge  # takes a second to load
+    from sklearn.pipeline import make_pipeline
+    from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
-    def __init__(self, known: Sequence[Pixels], balls: Sequence[_Ball]) -> None:
-        from sklearn.linear_model import Ridge  # takes a second to load
-        from sklearn.pipeline import make_pipeline
-        from sklearn.preprocessing import PolynomialFeatures, StandardScaler
-
-        terms = PolynomialFeatures(DEGREE, include_bias=False)
-        self._polynomial = make_pipeline(StandardScaler(), terms, StandardScaler(), Ridge(RIDGE))
-        self._polynomial.fit(
-            np.concatenate([_variables(each) for each in known]),
-            np.concatenate([ball.tilts for ball in balls]),
-        )
-
-    def normals(self, pixels: Pixels) -> FloatArray:
-        """Return the read normals (n, 3); the third axis is the untouched normal."""
-        return tilts_to_normals(self._polynomial.predict(_variables(pixels)))
+    terms = PolynomialFeatures(DEGREE, include_bias=False)
+    polynomial = make_pipeline(StandardScaler(), terms, StandardScaler(), Ridge(RIDGE))
+    return polynomial.fit(
+        np.concatenate([_variables(each) for each in known]),
+        np.concatenate([ball.tilts for ball in balls]),
+    )
 
 
 def _variables(pixels: Pixels) -> FloatArray:
@@ -209,10 +205,11 @@ def _pixels_of(
     ]
 
 
-def _judged(normals: FloatArray, ball: _Ball) -> tuple[float, float]:
-    """Return the ratio of the radius that is read to the ball's, at most `FLATTEST`, and the mean
-    angle between normals, degrees.
+def _judged(reader: Pipeline, pixels: Pixels, ball: _Ball) -> tuple[float, float]:
+    """Return the ratio of the radius that a reader reads to the ball's, at most `FLATTEST`, and the
+    mean angle between normals, degrees.
     """
+    normals = tilts_to_normals(reader.predict(_variables(pixels)))
     off = angles_between(normals, tilts_to_normals(ball.tilts))
     along = float((ball.offsets * normals[:, :2]).sum())
     curved = float((ball.offsets**2).sum()) / (FLATTEST * ball.radius)

@@ -102,12 +102,18 @@ class FitRounds:
         count = len(photographs.presses)
         self.held_out = settings.indices_held_out(photographs)
         self._used = [index for index in range(count) if index not in self.held_out]
+        self._fitted = self._small.subset(self._used)
         self._rendering = [number for number, each in enumerate(self._chosen) if each.renders]
         self.exposure = 1.0
         self._done = 0
         self._bodily = [number for number in self._rendering if not chosen[number].views]
         self._count = 2 * settings.rounds + 3
         self._count += len(self._bodily) * max(settings.rounds - 1, 1)
+
+    @property
+    def _used_contacts(self) -> list[SeenContact]:
+        """Contacts of the photographs that are fitted."""
+        return [self._seen[index] for index in self._used]
 
     def report_step(self, what: str) -> None:
         """Report the progress by one piece."""
@@ -125,26 +131,24 @@ class FitRounds:
         The exposure is fitted along if the fitted powers do not determine it.
         """
         steps = np.zeros(len(self._chosen))
-        small = self._small.subset(self._used)
         solution: Solution | None = None
         slopes: dict[int, PictureSlopes] = {}
         changes: FloatArray = np.zeros(len(steps))
         for number in range(self._settings.rounds):
-            seen = [self._seen[index] for index in self._used]
             rough = number < max(1, math.floor(ROUGH_SHARE * self._settings.rounds))
             self.report_step("rendering")
-            layers, noise = self._layers(small, seen, steps, number), None
+            layers, noise = self._layers(steps, number), None
             if number == 0:
                 total = layers.background.sum(axis=0)
-                self.exposure = matched_exposure(total, layers.chain, small.background)
+                self.exposure = matched_exposure(total, layers.chain, self._fitted.background)
             kept = self._bodily if 0 < number == self._settings.rounds - 1 else []
             if not kept:
-                slopes = self._slopes(small, seen, steps, number, layers)
+                slopes = self._slopes(steps, number, layers)
             if not rough or slopes:
-                again = self._layers(small, seen, steps, number, layers, AGAIN)
+                again = self._layers(steps, number, layers, AGAIN)
                 layers, noise = averaged(layers, again)
             self.report_step("fitting")
-            found = self._solution(small, seen, layers, steps, slopes, rough, noise, kept)
+            found = self._solution(layers, steps, slopes, rough, noise, kept)
             before, changes = changes, found.steps - steps
             changes[kept] = before[kept]
             if number:
@@ -160,8 +164,6 @@ class FitRounds:
 
     def _solution(
         self,
-        small: Photographs,
-        seen: Sequence[SeenContact],
         layers: LayeredPictures,
         steps: FloatArray,
         slopes: dict[int, PictureSlopes],
@@ -173,21 +175,22 @@ class FitRounds:
         has moved, the layers are displaced to it and fitted again. Numbers whose indices are kept
         do not change.
         """
-        pixels = ROUGH_PIXELS if rough else None
+        seen, pixels = self._used_contacts, ROUGH_PIXELS if rough else None
         views = [number for number in self._rendering if self._chosen[number].views]
         contacts = np.zeros((len(seen), 3))
         if not views:
             fit = LayeredFit(
-                small, seen, layers, self._chosen, self.exposure, steps, slopes, noise, kept, pixels
-            )
+                self._fitted, seen, layers, self._chosen, self.exposure, steps, slopes, noise,
+                kept, pixels,
+            )  # fmt: skip
             return fit.solve(steps, contacts)
-        rendered = self._view(small, steps)
+        rendered = self._view(steps)
         start, shown, view = steps.copy(), layers, rendered
         for blur in BLURS if rough else (0.0,) * VIEW_SOLVES:
-            every = slopes | self._view_slopes(small, seen, start, shown, view)
+            every = slopes | self._view_slopes(start, shown, view)
             fit = LayeredFit(
-                small, seen, shown, self._chosen, self.exposure, start, every, noise, kept, pixels,
-                blur,
+                self._fitted, seen, shown, self._chosen, self.exposure, start, every, noise, kept,
+                pixels, blur,
             )  # fmt: skip
             found = fit.solve(steps, contacts)
             steps, contacts = found.steps, found.contacts
@@ -196,7 +199,7 @@ class FitRounds:
                 break
             start = start.copy()
             start[views] = steps[views]
-            view = self._view(small, start)
+            view = self._view(start)
             shown = with_view(layers, seen, rendered, view)
         return found
 
@@ -231,8 +234,6 @@ class FitRounds:
 
     def _layers(
         self,
-        small: Photographs,
-        seen: Sequence[SeenContact],
         steps: FloatArray,
         number: int,
         contacts: LayeredPictures | None = None,
@@ -242,21 +243,15 @@ class FitRounds:
         numbers that need a rendering; all others are those of the design. `more` is added to the
         seed.
         """
-        moved = [self._chosen[number] for number in self._rendering]
-        self._model.set_design(designed(self._design, moved, steps[self._rendering]))
+        self._set_design(steps)
         return layered_pictures(
-            self._model, small, seen, self._settings.photons_of(number),
+            self._model, self._fitted, self._used_contacts, self._settings.photons_of(number),
             (self._settings.seed + number + more) % (MOST_SEED + 1),
             None if contacts is None else contacts.contacts, self._kept,
         )  # fmt: skip
 
     def _view_slopes(
-        self,
-        small: Photographs,
-        seen: Sequence[SeenContact],
-        steps: FloatArray,
-        layers: LayeredPictures,
-        view: CoveredView,
+        self, steps: FloatArray, layers: LayeredPictures, view: CoveredView
     ) -> dict[int, PictureSlopes]:
         """Return the slopes of the numbers of the view, by index, at layers with this view."""
         found: dict[int, PictureSlopes] = {}
@@ -264,18 +259,22 @@ class FitRounds:
             if self._chosen[number].views:
                 other = self._other(number, steps, VIEW_DIFFERENCE)
                 size = np.float32(other[number] - steps[number])
-                after = self._view(small, other)
-                changes = view_changes(layers, seen, view, after)
+                after = self._view(other)
+                changes = view_changes(layers, self._used_contacts, view, after)
                 found[number] = PictureSlopes(
                     [change / size for change in changes],
                     None if layers.coverage is None else (after.coverage - view.coverage) / size,
                 )
         return found
 
-    def _view(self, small: Photographs, steps: FloatArray) -> CoveredView:
+    def _view(self, steps: FloatArray) -> CoveredView:
+        self._set_design(steps)
+        return CoveredView.of(self._model, self._small.size)
+
+    def _set_design(self, steps: FloatArray) -> None:
+        """Give the model the design with the steps (n,) of numbers that need a rendering."""
         moved = [self._chosen[number] for number in self._rendering]
         self._model.set_design(designed(self._design, moved, steps[self._rendering]))
-        return CoveredView.of(self._model, small.size)
 
     def _other(self, number: int, steps: FloatArray, by: float) -> FloatArray:
         """Return steps with one of them changed, downwards if the number is at its upper limit."""
@@ -287,12 +286,7 @@ class FitRounds:
         return other
 
     def _slopes(
-        self,
-        small: Photographs,
-        seen: Sequence[SeenContact],
-        steps: FloatArray,
-        number: int,
-        layers: LayeredPictures,
+        self, steps: FloatArray, number: int, layers: LayeredPictures
     ) -> dict[int, PictureSlopes]:
         """Return the slopes of the numbers that need a rendering, by index, from renderings on both
         sides of their current steps (n,). Contacts of the layers are pressed in again if a number
@@ -313,7 +307,7 @@ class FitRounds:
                 for value in (low, high):
                     other = steps.copy()
                     other[index] = value
-                    moved = self._layers(small, seen, other, number, same, more)
+                    moved = self._layers(other, number, same, more)
                     ends.append(moved.pictures)
                 quotients.append([(two - one) / size for one, two in zip(*ends, strict=True)])
             found[index] = PictureSlopes.of_two(*quotients)
