@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 
 import optisense as ots
@@ -24,6 +27,9 @@ if TYPE_CHECKING:
 
 PLACES = [(-4.0, 2.0), (3.0, -2.0), (0.5, 3.0)]
 """Surface coordinates (mm) of the presses."""
+
+BALLS = [ots.Contact(ots.Sphere(3.0), at=place, depth=0.6) for place in PLACES]
+"""The presses."""
 
 PHOTONS = 100_000
 """Photons of the light."""
@@ -47,15 +53,13 @@ def mini() -> OpticalModel:
 @pytest.fixture(scope="session")
 def photographs(mini: OpticalModel) -> Photographs:
     """Three presses of it, as a camera with noise would take them."""
-    balls = [ots.Contact(ots.Sphere(3.0), at=place, depth=0.6) for place in PLACES]
-    return photograph_model(mini, balls, resolution=SIZE, photons=PHOTONS, seed=5)
+    return photograph_model(mini, BALLS, resolution=SIZE, photons=PHOTONS, seed=5)
 
 
 @pytest.fixture(scope="session")
 def small_photographs(mini: OpticalModel) -> Photographs:
     """The same presses in small photographs, which are compared and fitted in less time."""
-    balls = [ots.Contact(ots.Sphere(3.0), at=place, depth=0.6) for place in PLACES]
-    return photograph_model(mini, balls, resolution=SMALL, photons=PHOTONS, seed=5)
+    return photograph_model(mini, BALLS, resolution=SMALL, photons=PHOTONS, seed=5)
 
 
 @pytest.fixture(scope="session")
@@ -71,6 +75,17 @@ def layers(
 ) -> LayeredPictures:
     """The layers of the photographs; tests don't change them."""
     return layered_pictures(mini, photographs, seen, PHOTONS, 5)
+
+
+def with_pictures(photographs: Photographs, pictures: Sequence[np.ndarray]) -> Photographs:
+    """Return photographs with other levels (h, w, 3) of the background and of each press."""
+    ground, *presses = (np.clip(np.round(each), 0, 255).astype(np.uint8) for each in pictures)
+    pairs = zip(photographs.presses, presses, strict=True)
+    return replace(
+        photographs,
+        background=ground,
+        presses=tuple(replace(press, picture=picture) for press, picture in pairs),
+    )
 
 
 def numbers_of_fit(

@@ -24,7 +24,7 @@ from optisense.calibration import (
 from optisense.calibration._cross_readings import cross_readings
 from optisense.calibration._far_field import without_noise
 from optisense.calibration._orientation import orientation_notes
-from optisense.calibration.contact_finding import find_contact
+from optisense.calibration.contact_finding import FoundContact, find_contact
 from optisense.calibration.model_pictures import ModelPictures, model_pictures
 from optisense.calibration.realism import realism, similarity
 from optisense.calibration.seen_contacts import (
@@ -55,12 +55,22 @@ def cone(centre: tuple[float, float], radius: float) -> np.ndarray:
     return np.stack([40.0 * x, 30.0 * y, -30.0 * (x + y)], axis=2) * share[..., None]
 
 
+PLAIN = np.full((120, 160, 3), 120.0)
+"""Levels of an even background."""
+
+
+def found_in(
+    shown: np.ndarray, near: tuple[float, float] | None = None, radius: float | None = None
+) -> FoundContact | None:
+    """The contact in levels (120, 160, 3) before the plain background, as photographs have them."""
+    levels = np.clip(np.round(shown), 0, 255).astype(np.uint8)
+    return find_contact(levels, PLAIN.astype(np.uint8), near, radius)
+
+
 @pytest.mark.parametrize("centre", [(70.3, 60.8), (40.0, 44.5)])
 def test_an_odd_response_is_found_to_half_a_pixel(centre: tuple[float, float]) -> None:
-    rng = np.random.default_rng(3)
-    plain = np.full((120, 160, 3), 120.0)
-    shown = plain + cone(centre, 18.0) + 2.0 * rng.standard_normal(plain.shape)
-    found = find_contact(np.round(shown).astype(np.uint8), plain.astype(np.uint8))
+    noise = 2.0 * np.random.default_rng(3).standard_normal(PLAIN.shape)
+    found = found_in(PLAIN + cone(centre, 18.0) + noise)
     assert found is not None
     assert math.dist(found.centre, centre) < 0.5
     assert found.radius == pytest.approx(18.0, abs=1.0)
@@ -74,12 +84,9 @@ def test_a_label_leads_past_a_response_that_is_strongest_inside_the_contact() ->
     away = np.hypot(x, y)
     strength = 300.0 / (25.0 + away**2) * (away <= 24.0)
     response = np.stack([x, y, -x], axis=2) * strength[..., None]
-    plain = np.full((120, 160, 3), 120.0)
-    shown = np.clip(np.round(plain + response), 0, 255).astype(np.uint8)
-    free = find_contact(shown, plain.astype(np.uint8))
-    led = find_contact(shown, plain.astype(np.uint8), (82.0, 59.0), 22.0)
-    assert free is not None
-    assert led is not None
+    free = found_in(PLAIN + response)
+    led = found_in(PLAIN + response, (82.0, 59.0), 22.0)
+    assert free is not None and led is not None
     assert free.radius < 17.0
     assert math.dist(led.centre, (80.0, 60.0)) < 0.5
     assert 18.0 < led.radius < 26.0
@@ -87,11 +94,11 @@ def test_a_label_leads_past_a_response_that_is_strongest_inside_the_contact() ->
 
 def test_a_model_without_errors_has_the_figures_of_noise_alone() -> None:
     rng = np.random.default_rng(6)
-    plain, response = np.full((120, 160, 3), 120.0), cone((70.0, 60.0), 18.0)
-    noisy = np.round(plain + response + 3.0 * rng.standard_normal(plain.shape))
+    response = cone((70.0, 60.0), 18.0)
+    noisy = np.round(PLAIN + response + 3.0 * rng.standard_normal(PLAIN.shape))
     press = PhotographedPress("a.png", noisy.astype(np.uint8), 6.0)
-    photographs = Photographs(plain.astype(np.uint8), (press,))
-    perfect = ModelPictures(1.0, plain, (plain + response,), ())
+    photographs = Photographs(PLAIN.astype(np.uint8), (press,))
+    perfect = ModelPictures(1.0, PLAIN, (PLAIN + response,), ())
     (found,) = realism(photographs, [SeenContact((70.0, 60.0), 18.0)], perfect).presses
     for name in ("unexplained", "contact", "ring"):
         assert getattr(found.noise, name) == pytest.approx(getattr(found, name), rel=0.1)
@@ -101,14 +108,14 @@ def test_a_model_without_errors_has_the_figures_of_noise_alone() -> None:
 
 def test_a_drift_between_background_and_press_is_no_error_of_the_model() -> None:
     """Only the figures of the far field and of the drift contain it."""
-    plain, response = np.full((120, 160, 3), 120.0), cone((70.0, 60.0), 12.0)
-    pictures = ModelPictures(1.0, plain, (plain + response,), ())
+    response = cone((70.0, 60.0), 12.0)
+    pictures = ModelPictures(1.0, PLAIN, (PLAIN + response,), ())
     found = []
     for drift in (0.0, 3.0):
-        noise = 2.0 * np.random.default_rng(8).standard_normal(plain.shape)
-        taken = np.round(plain + response + noise + (drift, 0.0, 0.0)).astype(np.uint8)
+        noise = 2.0 * np.random.default_rng(8).standard_normal(PLAIN.shape)
+        taken = np.round(PLAIN + response + noise + (drift, 0.0, 0.0)).astype(np.uint8)
         press = PhotographedPress("a.png", taken, 6.0)
-        photographs = Photographs(plain.astype(np.uint8), (press,))
+        photographs = Photographs(PLAIN.astype(np.uint8), (press,))
         found += realism(photographs, [SeenContact((70.0, 60.0), 12.0)], pictures).presses
     steady, drifted = found
     assert drifted.unexplained == pytest.approx(steady.unexplained, rel=0.01)
@@ -128,10 +135,7 @@ def test_the_part_of_an_error_without_noise_is_that_of_a_smooth_error() -> None:
 
 
 def test_no_contact_is_found_in_noise() -> None:
-    rng = np.random.default_rng(3)
-    plain = np.full((120, 160, 3), 120.0)
-    noisy = plain + 2.0 * rng.standard_normal(plain.shape)
-    assert find_contact(np.round(noisy).astype(np.uint8), plain.astype(np.uint8)) is None
+    assert found_in(PLAIN + 2.0 * np.random.default_rng(3).standard_normal(PLAIN.shape)) is None
 
 
 def test_contacts_of_a_model_are_found_where_they_press(
@@ -238,10 +242,8 @@ def test_wrong_labels_and_missing_contacts_are_told(photographs: Photographs) ->
     assert "away from the contact" in words[0]
     assert "it shows no contact" in words[1]
     assert len(words) == 2
-    (used, missing, _), (true, *_) = (
-        ContactFinder(odd).contacts(),
-        ContactFinder(photographs).contacts(),
-    )
+    used, missing, _ = ContactFinder(odd).contacts()
+    true = ContactFinder(photographs).contacts()[0]
     assert missing is None
     assert used is not None and true is not None
     assert math.dist(used.centre, true.centre) < 0.1 * true.radius
@@ -250,14 +252,13 @@ def test_wrong_labels_and_missing_contacts_are_told(photographs: Photographs) ->
 def test_a_blemish_of_the_background_replaces_no_label() -> None:
     """A press that the camera hardly shows keeps its label; all photographs show the blemish."""
     rng = np.random.default_rng(4)
-    plain = np.full((120, 160, 3), 120.0)
     places = [(100.0, 40.0), (60.0, 50.0), (110.0, 80.0), (80.0, 60.0)]
     presses = []
     for place, strength in zip(places, (0.5, 0.5, 0.5, 0.0), strict=True):
-        shown = plain + strength * cone(place, 10.0) + rng.standard_normal(plain.shape)
+        shown = PLAIN + strength * cone(place, 10.0) + rng.standard_normal(PLAIN.shape)
         picture = np.round(shown).astype(np.uint8)
         presses.append(PhotographedPress("a.png", picture, 6.0, place, 10.0))
-    background = np.round(plain - cone((30.0, 90.0), 8.0)).astype(np.uint8)
+    background = np.round(PLAIN - cone((30.0, 90.0), 8.0)).astype(np.uint8)
     photographs = Photographs(background, tuple(presses))
     found = ContactFinder(photographs).contacts()
     for seen, place in zip(found, places, strict=True):
@@ -269,17 +270,10 @@ def test_a_blemish_of_the_background_replaces_no_label() -> None:
 def test_a_background_with_a_contact_is_told(photographs: Photographs) -> None:
     assert ContactFinder(photographs).doubts() == []
     first, *others = photographs.presses
-    words = ContactFinder(
-        replace(photographs, background=first.picture, presses=tuple(others))
-    ).doubts()
-    assert any("seems to show a contact" in note for note in words)
-
-
-def test_a_contact_of_the_background_is_told_where_labels_deny_it(
-    photographs: Photographs,
-) -> None:
-    presses = [replace(press, centre=(16.0 + 8.0 * number, 16.0), radius=12.0)
-               for number, press in enumerate((photographs.presses[0],) * 3)]  # fmt: skip
+    pressed = replace(photographs, background=first.picture, presses=tuple(others))
+    assert any("seems to show a contact" in note for note in ContactFinder(pressed).doubts())
+    # Labels deny the contact that all photographs show.
+    presses = [replace(first, centre=(column, 16.0), radius=12.0) for column in (16.0, 24.0, 32.0)]
     words = ContactFinder(replace(photographs, presses=tuple(presses))).doubts()
     assert "several photographs show one at column" in words[0]
 
@@ -287,12 +281,9 @@ def test_a_contact_of_the_background_is_told_where_labels_deny_it(
 def test_presses_at_one_place_are_told(photographs: Photographs) -> None:
     rng = np.random.default_rng(3)
     one = photographs.presses[0]
-    again = [
-        replace(one, picture=np.clip(one.picture + rng.integers(-1, 2, one.picture.shape), 0, 255))
-        for _ in range(2)
-    ]
-    presses = [replace(press, picture=press.picture.astype(np.uint8)) for press in again]
-    some = replace(photographs, presses=(one, *presses, photographs.presses[1]))
+    noisy = (one.picture + rng.integers(-1, 2, one.picture.shape) for _ in range(2))
+    again = [replace(one, picture=np.clip(each, 0, 255).astype(np.uint8)) for each in noisy]
+    some = replace(photographs, presses=(one, *again, photographs.presses[1]))
     assert "most presses are at the same place" in ContactFinder(some).doubts()[0]
 
 

@@ -16,6 +16,8 @@ from optisense.calibration._least_squares import jackknife_covariance
 from optisense.calibration.quantities import quantities_of
 from optisense.calibration.seen_contacts import SeenContact
 
+from .conftest import with_pictures
+
 CLUSTERS, ROWS, UNKNOWNS = 12, 200, 5
 """Size of a linear fit: as many clusters as there are blocks in a picture of 4 to 3."""
 
@@ -66,13 +68,8 @@ def test_dark_places_mislead_no_fit_that_knows_the_noise_of_the_light(
     truth = np.array([-0.8, 0.3, 1.0, -0.2, -0.8, 0.9, 0.4, 0.6, 0.4, 0.9])
     still = np.zeros((len(seen), 3))
     made = LayeredFit(photographs, seen, layers, chosen, 250.0, truth, {})
-    pictures = [np.round(levels).astype(np.uint8) for levels in made.pictures(truth, still)]
-    assert (pictures[0] < 60).mean() > 0.02  # some places are dark
-    presses = [
-        replace(press, picture=picture)
-        for press, picture in zip(photographs.presses, pictures[1:], strict=True)
-    ]
-    real = replace(photographs, background=pictures[0], presses=tuple(presses))
+    real = with_pictures(photographs, made.pictures(truth, still))
+    assert (real.background < 60).mean() > 0.02  # some places are dark
     errors: list[list[np.ndarray]] = [[], []]  # without and with the noise
     for seed in (4, 5):
         rng = np.random.default_rng(seed)
@@ -110,15 +107,8 @@ def test_noise_of_slopes_is_no_information(
 
     moved = layers.plus([np.float32(off) * slope for slope in true])
     made = LayeredFit(photographs, seen, moved, chosen, 250.0, start, {})
-    levels = [
-        np.clip(np.round(each + rng.standard_normal(each.shape)), 0, 255).astype(np.uint8)
-        for each in made.pictures(start, still)
-    ]
-    presses = [
-        replace(press, picture=picture)
-        for press, picture in zip(photographs.presses, levels[1:], strict=True)
-    ]
-    real = replace(photographs, background=levels[0], presses=tuple(presses))
+    levels = made.pictures(start, still)
+    real = with_pictures(photographs, [each + rng.standard_normal(each.shape) for each in levels])
     mean, noise = averaged(layers, layers)
     found = []
     for signal, size in ((1.0, 0.002), (0.0, 0.01)):

@@ -20,7 +20,7 @@ from optisense.calibration.settings import CalibrationSettings
 from optisense.design.posing import with_camera_turned
 from optisense.kept_arrays import NOTHING_KEPT
 
-from .conftest import PHOTONS, PLACES, SIZE, SMALL, numbers_of_fit
+from .conftest import BALLS, PHOTONS, SIZE, SMALL, numbers_of_fit
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
@@ -112,9 +112,8 @@ def test_a_displacement_does_not_average_the_noise_of_layers(mini: OpticalModel)
 
 def test_a_hidden_view_is_found() -> None:
     real = seen_from(HIDDEN)
-    balls = [ots.Contact(ots.Sphere(3.0), at=place, depth=0.6) for place in PLACES]
     photographs = photograph_model(
-        real, balls, resolution=SMALL, photons=PHOTONS, seed=7, noise=1.0
+        real, BALLS, resolution=SMALL, photons=PHOTONS, seed=7, noise=1.0
     )
     settings = CalibrationSettings(families=("powers", "view", "place"), rounds=1, photons=PHOTONS)
     design = ots.load("gelsight-mini-ideal")
