@@ -29,10 +29,8 @@ picture scatters by about as much.
 """
 
 FARTHEST = 0.2
-"""Largest distance over which a correlation is summed, as a share of the picture's width: one
-picture contains too few independent errors of a larger extent to tell it, and without this limit a
-model that is wrong everywhere would not be fitted to the background at all.
-"""
+"""Largest distance over which a correlation is summed, as a share of the picture's width. Without
+it, a model that is wrong everywhere would not be fitted to the background at all."""
 
 PHOTOGRAPH_NOISE = 1.0
 """Expected noise of a photograph that is averaged to half its width, levels."""

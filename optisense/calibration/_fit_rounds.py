@@ -51,21 +51,15 @@ noise, but the coverage of a pixel changes in steps of a sixteenth.
 
 VIEW_SOLVES, VIEW_MOVED = 3, 0.03
 """Largest number of fits to the layers of one rendering, and the change of the view, in plausible
-ranges, at which they end. Pictures with sharp borders change linearly for shifts of a pixel only,
-and a fit to linear changes finds about half of a larger shift.
-"""
+ranges, at which they end. A fit to linear changes finds about half of a shift of several pixels."""
 
 BLURS = 6.0, 3.0, 0.0
 """Standard deviations, pixels, by which pictures are blurred in the successive fits of a rough
-round. Details fit over displacements of about their size only, and the start is off by up to a
-tenth of the width.
-"""
+round: details fit over displacements of about their size only."""
 
 ROUGH_SHARE, ROUGH_PIXELS = 0.5, 36.0
 """Share of the rounds, the first one at least, that count one independent error for so many pixels
-of each picture. The errors of the start extend over the whole picture: weights estimated from them
-would neglect the background, and its errors would remain.
-"""
+of each picture. Weights estimated from the errors of the start would neglect the background."""
 
 AGAIN = 1000
 """Number added to a seed for a second rendering, with other noise; above the number of rounds."""

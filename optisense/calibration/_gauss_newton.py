@@ -48,10 +48,8 @@ NEAR = 2.2
 """Radius within which the response of a press counts, in its radii; beyond, there is noise."""
 
 LEVELS = 12.0, 253.0
-"""Smallest and largest level that is compared. Above, pictures are clipped. Below, a usual tone
-curve is ten times as steep as in the middle of its range, so that the noise of the light outweighs
-everything else, and cuts off negative light.
-"""
+"""Smallest and largest level that is compared. Above, pictures are clipped; below, a usual tone
+curve is so steep that the noise of the light outweighs everything else."""
 
 STEP = 0.002
 """Step of a number's difference quotient, in plausible ranges: far above the rounding of pictures,
@@ -65,11 +63,8 @@ of its radius: the errors of hand labels.
 
 BLOCKS = 4
 """Number of square blocks across a picture whose errors are regarded as independent of each other
-in the estimate of uncertainties: with smaller blocks, over which the errors of the light are
-correlated, hidden numbers of simulated photographs are up to twice as many standard deviations
-off. Errors at one place of all pictures are not regarded as independent: those of the light are the
-same in all, and those of the background are in each response.
-"""
+in the estimate of uncertainties: the errors of the light are correlated over smaller ones. Errors
+at one place of all pictures are not independent, as they have the same light and background."""
 
 MOST_STEPS = 20
 """Largest number of damped steps of one descent; several times as many as a fit needs."""

@@ -25,9 +25,8 @@ EXCHANGED = "stored with red and blue exchanged"
 """Words for pictures whose channels are in the reverse order."""
 
 CLEARLY = 0.07
-"""Difference of likenesses from which on another way of placing is noted. If photographs of a
-GelSight Mini are mirrored left to right, which changes them least, the difference is 0.10; if they
-are right, every other likeness is 0.07 lower or more."""
+"""Difference of likenesses from which on another way of placing is noted: photographs of a GelSight
+Mini that are mirrored left to right, which changes them least, have a difference of 0.10."""
 
 ABOUT_EQUAL = 0.03
 """Difference of likenesses up to which a way is named beside the best one: a sensor whose lights

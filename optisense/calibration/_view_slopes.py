@@ -33,11 +33,8 @@ larger one see another part of the skin, such as by another mirror.
 """
 
 VIEW_BLUR = 3.0
-"""Standard deviation, pixels, of the blur of layers before they are displaced. It removes the noise
-of single pixels: with 1.2, the fitted view of a simulated GelBelt is off by up to eight standard
-deviations because of noise, and with 2 to 4 by up to three. Spots of light are several times as
-wide.
-"""
+"""Standard deviation, pixels, of the blur of layers before they are displaced: it removes the noise
+of single pixels, which moves a fitted view, and spots of light are several times as wide."""
 
 
 def view_changes(

@@ -35,10 +35,8 @@ of the contact: it contains the contact and the steepest part of the skin around
 """
 
 SIMILARITY_WINDOW = 0.2
-"""Standard deviation of the similarity's window, in radii of the contact: about six pixels of a
-usual contact. In the window of 1.5 pixels that Wang et al. (2004) use for whole pictures, the noise
-of a photograph outweighs the response of a smooth ball.
-"""
+"""Standard deviation of the similarity's window, in radii of the contact: about six pixels. In that
+of 1.5 pixels of Wang et al. (2004), noise outweighs the response of a smooth ball."""
 
 LEVELS = 255.0
 """Range of a picture's levels, from which the constants of the similarity follow."""

@@ -31,9 +31,7 @@ a second seed of the light, and another choice of the presses held out, change i
 
 BACKGROUND_AS_WELL = 1.0
 """Loss of the background's peak signal-to-noise ratio, dB, above which a fit predicts the untouched
-sensor worse: a quarter more energy of the error. Another seed of the light changes it by some
-tenths.
-"""
+sensor worse: a quarter more energy of the error, and far more than another seed changes."""
 
 ADVICE = (
     "Keep the design that you had, fit fewer numbers, or take more photographs at other places."

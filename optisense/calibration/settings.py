@@ -16,10 +16,8 @@ numbers by less than a later round does.
 """
 
 ROUNDS = 4
-"""Default number of rounds of rendering and fitting. With three, hidden numbers of simulated
-photographs are up to ten times as far off as with five, as layers are linear for small changes
-only.
-"""
+"""Default number of rounds of rendering and fitting: with three, hidden numbers of simulated
+photographs are far off, as layers are linear for small changes only."""
 
 HELD_OUT = 3
 """Interval of held-out presses: every third press is held out and only evaluated, if there are at

@@ -46,9 +46,8 @@ LEAST_PIXELS = 20
 
 QUIET = 3.0
 """Difference from the untouched picture (levels of 255, in each channel) below which the tilt is
-read as 0, twice the usual noise of a pixel; otherwise small errors over a wide, flat surface would
-add up in the depth.
-"""
+read as 0, twice the usual noise: small errors over a flat surface would add up in the depth."""
+
 QUIET_BLUR = 1.5
 """Standard deviation (pixels) of the Gaussian blur of a picture before it is compared with the
 untouched one; it averages the noise of some 28 pixels.

@@ -34,9 +34,7 @@ BATCH = 256
 
 STEPS = 2400
 """Number of steps of the optimiser in the fit of the network: 30 passes over 20,000 samples, after
-which more passes overfit. With fewer samples and as many passes, the network would underfit: twenty
-balls in pictures of GelSight Mini of 160 pixels give 4,500 samples, and the error on other objects
-is 6.6 degrees after 30 passes and 5.7 degrees after 200."""
+which more passes overfit. With fewer samples and as many passes, the network would underfit."""
 
 MOST_EPOCHS = 200
 """Largest number of passes over few samples; more do nothing with 20 balls, overfit with 10."""

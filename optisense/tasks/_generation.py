@@ -48,9 +48,8 @@ if TYPE_CHECKING:
     from optisense.optics import OpticalModel, TactileImage
 
 ATTEMPTS = 100
-"""Number of places drawn for one sample before it is recorded as failed. A plate of 8 mm keeps
-clear of a GelSight Mini's edge at one place of 4 to 12, depending on its rotation, so that one
-sample in 30,000 fails; a rejected place takes chief rays but no rendering."""
+"""Number of places drawn for one sample before it is recorded as failed: with a plate of 8 mm on a
+GelSight Mini, one sample in 30,000 fails. A rejected place takes chief rays but no rendering."""
 
 DRAWING = 2
 """Version of how samples and their splits follow from the seed. Datasets of another version, or of

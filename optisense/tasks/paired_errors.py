@@ -13,10 +13,9 @@ CONFIDENCE = 95.0
 """Confidence level (per cent) of the interval, the usual one."""
 
 LEAST_OBJECTS = 6
-"""Smallest number of objects for a verdict. The interval assumes that changes are distributed
-normally. Without this assumption, only their signs count: for two equal sensors, those of 5 objects
-agree once in 16 times, and those of 6 objects once in 32, which is below the 5 per cent of the
-interval."""
+"""Smallest number of objects for a verdict. If changes are not distributed normally, only their
+signs count: for two equal sensors, those of 6 objects agree once in 32 times, which is below the 5
+per cent of the interval."""
 
 BETTER, WORSE, INCONCLUSIVE = "better", "worse", "inconclusive"
 

@@ -88,8 +88,7 @@ class VerificationSettings:
 
 LARGEST_AREA_A_BALL = 20.0
 """Largest area of skin (mm^2) for each calibrating ball with which an inconclusive verdict needs no
-remark. `--quick` has 13 mm^2 on GelSight Mini. On GelSight360, networks that are fitted to 20 balls
-(110 mm^2 each) have errors on other balls that are a tenth larger than those fitted to 115."""
+remark: with 110 mm^2, networks have errors that are a tenth larger than with 20."""
 
 
 @dataclass(frozen=True)
