@@ -95,8 +95,9 @@ def _belt_units(dimensions: Dimensions, settings: Values, seed: int) -> list[Uni
 def _belt_margins(records: Sequence[Record], settings: Values) -> dict[str, float | None]:
     third, second, bright, dark = records
     found = {f"belt {name}": _difference(third, second, name) for name in OBJECTIVES}
-    lit = [record.values.get("radiance") for record in (bright, dark)]
-    found["belt light"] = None if None in lit else gelbelt_lights.DARK - lit[1] / lit[0]
+    lit, unlit = (record.values.get("radiance") for record in (bright, dark))
+    share = None if lit is None or unlit is None else unlit / lit
+    found["belt light"] = None if share is None else gelbelt_lights.DARK - share
     return found
 
 
@@ -171,7 +172,9 @@ def _mirror_margins(records: Sequence[Record], settings: Values) -> dict[str, fl
 
 
 def _score(design: Values, settings: Values, seed: int, what: str) -> Unit:
-    images = {key: settings[key] for key in ("resolution", "photons", "depth") if key in settings}
+    images: Values = {
+        key: settings[key] for key in ("resolution", "photons", "depth") if key in settings
+    }
     return score_unit(design, OBJECTIVES, {**images, "seed": seed}, f"{what}, seed {seed}")
 
 

@@ -182,10 +182,7 @@ class _Maker:
         for attempt in range(ATTEMPTS):
             if attempt:
                 drawn = drawn.elsewhere(self._places, rng)
-            try:
-                reason = self._why_not(drawn)
-            except ContactError as error:
-                reason = error.message
+            reason = self._why_not(drawn)
             if reason:
                 continue
             image = self._image(drawn.contact)
@@ -196,10 +193,11 @@ class _Maker:
         self._failures.add({"index": index, "reason": reason})
 
     def _why_not(self, drawn: DrawnContact) -> str:
-        """Return the reason why a contact makes no sample, from its chief rays, or an empty text;
-        ContactError is raised if it cannot be pressed in there.
-        """
-        mask = self._touched(drawn.contact)
+        """Return the reason why a contact makes no sample, by its chief rays, or an empty text."""
+        try:
+            mask = self._touched(drawn.contact)
+        except ContactError as error:
+            return error.message
         if mask.sum() < LEAST_PIXELS:
             return _too_small(self._resolution)
         margin = self._settings.contacts.margin
