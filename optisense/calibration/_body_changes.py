@@ -1,6 +1,6 @@
 """Changes of a sensor's body that a calibration tries: lights, edges, gel and coating.
 
-Each function takes a design and a number, and returns a changed design; the given one is not
+Each function takes a design and, last, a number, and returns a changed design; the given one is not
 changed.
 """
 
@@ -42,12 +42,12 @@ WIDEST_ANGLE = 89.0
 """Largest angle from its axis to which a spot is widened, degrees: 90 would be a half-space."""
 
 
-def with_lights_moved(design: SensorDesign, group: str, along: float) -> SensorDesign:
+def with_lights_moved(group: str, design: SensorDesign, along: float) -> SensorDesign:
     """Return a design with the lights of a group moved by `along` mm along the camera's axis."""
     return with_lights(design, group, partial(moved, shift=along * design.camera.axes()[2]))
 
 
-def with_lights_tilted(design: SensorDesign, group: str, angle: float) -> SensorDesign:
+def with_lights_tilted(group: str, design: SensorDesign, angle: float) -> SensorDesign:
     """Return a design with the lights of a group turned by `angle` degrees towards the viewing
     direction.
 
@@ -81,7 +81,7 @@ def row_length(design: SensorDesign, group: str) -> float | None:
     return length
 
 
-def with_row_length(design: SensorDesign, group: str, length: float) -> SensorDesign:
+def with_row_length(group: str, design: SensorDesign, length: float) -> SensorDesign:
     """Return a design whose lights of a straight row lie closer or farther apart, so that the outer
     ones have a distance of `length` mm; the middle of the row stays in place.
     """
@@ -171,7 +171,7 @@ def edge_roughness(design: SensorDesign, parts: list[str]) -> float | None:
     return known[0] if known else None
 
 
-def with_edge_roughness(design: SensorDesign, parts: list[str], roughness: float) -> SensorDesign:
+def with_edge_roughness(parts: list[str], design: SensorDesign, roughness: float) -> SensorDesign:
     """Return a design with a roughness on the faces of parts towards the picture's four sides."""
     found = design.copy()
     right, up, _ = design.camera.axes()

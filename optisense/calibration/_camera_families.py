@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 import numpy as np
@@ -101,19 +101,15 @@ def colours(design: SensorDesign) -> list[FitQuantity]:
     ]  # fmt: skip
 
 
-def tone(design: SensorDesign) -> list[FitQuantity]:
+def tone(design: SensorDesign) -> Iterator[FitQuantity]:
     """Return the exponent of the tone curve; a curve of another kind has none."""
     curve = design.camera.tone_curve
-    if curve is not None and not isinstance(curve, GammaCurve):
-        return []
-    start = GAMMA_START if curve is None else curve.gamma
-    return [
-        FitQuantity(
-            "camera.tone_curve.gamma", "exponent of the tone curve", "", start, 0.5, 5.0,
-            GAMMA_RANGE, True, home="camera.tone_curve",
-            guessed=not isinstance(curve, GammaCurve),
-        )
-    ]  # fmt: skip
+    if curve is None or isinstance(curve, GammaCurve):
+        yield FitQuantity(
+            "camera.tone_curve.gamma", "exponent of the tone curve", "",
+            GAMMA_START if curve is None else curve.gamma, 0.5, 5.0, GAMMA_RANGE, True,
+            home="camera.tone_curve", guessed=curve is None,
+        )  # fmt: skip
 
 
 def black(design: SensorDesign) -> list[FitQuantity]:
@@ -128,7 +124,7 @@ def black(design: SensorDesign) -> list[FitQuantity]:
     ]  # fmt: skip
 
 
-def shading(design: SensorDesign) -> list[FitQuantity]:
+def shading(design: SensorDesign) -> Iterator[FitQuantity]:
     """Return strength of the lens shading in each channel in which a light emits, and its power; a
     shading of another kind has neither.
     """
@@ -136,86 +132,75 @@ def shading(design: SensorDesign) -> list[FitQuantity]:
     green, red, blue, power = FALLOFF_START, FALLOFF_START, FALLOFF_START, SHADING_POWER
     if own is not None:
         if not isinstance(own, RadialShading):
-            return []
+            return
         green, power = own.falloff, own.power
         red = green if own.red_falloff is None else own.red_falloff
         blue = green if own.blue_falloff is None else own.blue_falloff
-    found = [
-        FitQuantity(
-            f"camera.shading.{name}", f"lens shading of {letter} in the image corners", "", start,
-            0.0, 0.95, FALLOFF_RANGE, home="camera.shading", guessed=own is None,
-        )
-        for channel, name, letter, start in (
-            (1, "falloff", "G", green), (0, "red_falloff", "R", red), (2, "blue_falloff", "B", blue)
-        )
-        if channel in lit
-    ]  # fmt: skip
-    outwards = FitQuantity(
+    for channel, name, letter, start in (
+        (1, "falloff", "G", green),
+        (0, "red_falloff", "R", red),
+        (2, "blue_falloff", "B", blue),
+    ):
+        if channel in lit:
+            yield FitQuantity(
+                f"camera.shading.{name}", f"lens shading of {letter} in the image corners", "",
+                start, 0.0, 0.95, FALLOFF_RANGE, home="camera.shading", guessed=own is None,
+            )  # fmt: skip
+    yield FitQuantity(
         "camera.shading.power", "exponent of the lens shading by the distance from the middle", "",
         power, 1.0, 8.0, SHADING_RANGE, True, home="camera.shading", guessed=own is None,
     )  # fmt: skip
-    return [*found, outwards]
 
 
-def view(design: SensorDesign) -> list[FitQuantity]:
+def view(design: SensorDesign) -> Iterator[FitQuantity]:
     """Return the field of view."""
     fov = design.camera.fov
     most = 175.0 if design.camera.projection == "perspective" else 360.0
-    return [
-        FitQuantity(
-            "camera.fov", "field of view", "degrees", fov, 0.3 * fov, min(most, 3.0 * fov),
-            FIELD_RANGE, True, True, views=True,
-        )
-    ]  # fmt: skip
+    yield FitQuantity(
+        "camera.fov", "field of view", "degrees", fov, 0.3 * fov, min(most, 3.0 * fov),
+        FIELD_RANGE, True, True, views=True,
+    )  # fmt: skip
 
 
-def place(design: SensorDesign) -> list[FitQuantity]:
+def place(design: SensorDesign) -> Iterator[FitQuantity]:
     """Return the camera's place across its axis."""
-    return [
-        FitQuantity(
+    for number, (axis, words) in enumerate(
+        (("right", "to the picture's right"), ("up", "to its top"))
+    ):
+        yield FitQuantity(
             f"camera.across.{axis}", f"place of the camera {words}", "mm", 0.0, -10.0, 10.0,
             PLACE_RANGE, renders=True, views=True,
             change=partial(with_camera_moved, number), home="camera.position",
-        )
-        for number, (axis, words) in enumerate(
-            (("right", "to the picture's right"), ("up", "to its top"))
-        )
-    ]  # fmt: skip
+        )  # fmt: skip
 
 
-def pose(design: SensorDesign) -> list[FitQuantity]:
+def pose(design: SensorDesign) -> Iterator[FitQuantity]:
     """Return the turns of the camera about its axes, and its place along its axis."""
-    found = [
-        FitQuantity(
+    for number, (name, words) in enumerate(
+        (("pitch", "up"), ("yaw", "to the left"), ("roll", "clockwise"))
+    ):
+        yield FitQuantity(
             f"camera.turn.{name}", f"turn of the camera {words}", "degrees", 0.0, -20.0, 20.0,
             TURN_RANGE, renders=True, views=True,
             change=partial(with_camera_turned, number), home="camera.direction",
-        )
-        for number, (name, words) in enumerate(
-            (("pitch", "up"), ("yaw", "to the left"), ("roll", "clockwise"))
-        )
-    ]  # fmt: skip
-    ahead = FitQuantity(
+        )  # fmt: skip
+    yield FitQuantity(
         "camera.along", "place of the camera towards the skin", "mm", 0.0, -5.0, 5.0, AHEAD_RANGE,
         renders=True, views=True, change=partial(with_camera_moved, 2),
         home="camera.position",
     )  # fmt: skip
-    return [*found, ahead]
 
 
-def distortion(design: SensorDesign) -> list[FitQuantity]:
+def distortion(design: SensorDesign) -> Iterator[FitQuantity]:
     """Return the first coefficient of the lens's radial distortion."""
     own = design.camera.distortion
     start = 0.0 if own is None else getattr(own, "k1", None)
-    if start is None:
-        return []
-    return [
-        FitQuantity(
+    if start is not None:
+        yield FitQuantity(
             "camera.distortion.k1", "radial distortion of the lens (k1)", "", start,
             min(start, -0.5), max(start, 0.5), DISTORTION_RANGE, renders=True, views=True,
             change=with_distortion, home="camera.distortion",
-        )
-    ]  # fmt: skip
+        )  # fmt: skip
 
 
 def with_camera_moved(axis: int, design: SensorDesign, amount: float) -> SensorDesign:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from optisense.calibration import _body_changes, _camera_families
 from optisense.calibration.quantity import FitQuantity
@@ -85,7 +86,7 @@ class Family:
     """
 
     words: str
-    of: Callable[[SensorDesign], list[FitQuantity]]
+    of: Callable[[SensorDesign], Iterable[FitQuantity]]
     usual: bool = True
 
 
@@ -104,131 +105,91 @@ def _leds(design: SensorDesign) -> list[FitQuantity]:
     return _powers(_body_changes.with_single_lights(design), LED_RANGE)
 
 
-def _lights(design: SensorDesign) -> list[FitQuantity]:
-    found = []
+def _lights(design: SensorDesign) -> Iterator[FitQuantity]:
     for name in design.lights:
-        found += [
-            FitQuantity(
-                f"lights.{name}.along", f"place of the {name} lights towards the skin", "mm",
-                0.0, -2.0, 2.0, LIGHT_PLACE_RANGE, False, True, False,
-                _of_group(_body_changes.with_lights_moved, name), f"lights.{name}",
-            ),
-            FitQuantity(
-                f"lights.{name}.tilt", f"tilt of the {name} lights towards the skin", "degrees",
-                0.0, -40.0, 40.0, LIGHT_TILT_RANGE, False, True, False,
-                _of_group(_body_changes.with_lights_tilted, name), f"lights.{name}",
-            ),
-        ]  # fmt: skip
-    return found
+        yield FitQuantity(
+            f"lights.{name}.along", f"place of the {name} lights towards the skin", "mm",
+            0.0, -2.0, 2.0, LIGHT_PLACE_RANGE, renders=True,
+            change=partial(_body_changes.with_lights_moved, name), home=f"lights.{name}",
+        )  # fmt: skip
+        yield FitQuantity(
+            f"lights.{name}.tilt", f"tilt of the {name} lights towards the skin", "degrees",
+            0.0, -40.0, 40.0, LIGHT_TILT_RANGE, renders=True,
+            change=partial(_body_changes.with_lights_tilted, name), home=f"lights.{name}",
+        )  # fmt: skip
 
 
-def _rows(design: SensorDesign) -> list[FitQuantity]:
-    found = []
+def _rows(design: SensorDesign) -> Iterator[FitQuantity]:
     for name in design.lights:
         length = _body_changes.row_length(design, name)
         if length is not None:
-            found.append(
-                FitQuantity(
-                    f"lights.{name}.row", f"length of the row of {name} lights", "mm", length,
-                    ROW_LIMITS[0] * length, ROW_LIMITS[1] * length, ROW_RANGE, True, True, False,
-                    _of_group(_body_changes.with_row_length, name), f"lights.{name}.lights",
-                )
+            yield FitQuantity(
+                f"lights.{name}.row", f"length of the row of {name} lights", "mm", length,
+                ROW_LIMITS[0] * length, ROW_LIMITS[1] * length, ROW_RANGE, True, renders=True,
+                change=partial(_body_changes.with_row_length, name), home=f"lights.{name}.lights",
             )  # fmt: skip
-    return found
 
 
-def _of_group(
-    change: Callable[[SensorDesign, str, float], SensorDesign], group: str
-) -> Callable[[SensorDesign, float], SensorDesign]:
-    return lambda design, value: change(design, group, value)
-
-
-def _emission(design: SensorDesign) -> list[FitQuantity]:
-    if not _body_changes.widens(design):
-        return []
-    return [
-        FitQuantity(
+def _emission(design: SensorDesign) -> Iterator[FitQuantity]:
+    if _body_changes.widens(design):
+        yield FitQuantity(
             "lights.emission", "width of the emission of all lights, times", "", 1.0, 0.3, 1.5,
-            WIDTH_RANGE, True, True, False, _body_changes.with_emission_width, "lights",
-        )
-    ]  # fmt: skip
+            WIDTH_RANGE, True, renders=True, change=_body_changes.with_emission_width,
+            home="lights",
+        )  # fmt: skip
 
 
-def _gel(design: SensorDesign) -> list[FitQuantity]:
-    found = []
+def _gel(design: SensorDesign) -> Iterator[FitQuantity]:
+    gels = design.parts_of(Role.ELASTOMER)
     thickness = _body_changes.flat_gel_thickness(design)
     if thickness is not None:
-        name = design.parts_of(Role.ELASTOMER)[0]
-        found.append(
-            FitQuantity(
-                f"parts.{name}.thickness", "thickness of the gel", "mm", thickness,
-                0.7 * thickness, 1.4 * thickness, THICKNESS_RANGE, True, True, True,
-                _body_changes.with_gel_thickness, f"parts.{name}",
-            )
+        yield FitQuantity(
+            f"parts.{gels[0]}.thickness", "thickness of the gel", "mm", thickness,
+            0.7 * thickness, 1.4 * thickness, THICKNESS_RANGE, True, True, True,
+            _body_changes.with_gel_thickness, f"parts.{gels[0]}",
         )  # fmt: skip
-    gels = design.parts_of(Role.ELASTOMER)
     for name in sorted({design.parts[part].material or "" for part in gels}):
         material = design.materials.get(name)
         if isinstance(material, Dielectric) and material.elasticity is not None:
-            path = f"materials.{name}.elasticity.poisson_ratio"
-            found.append(
-                FitQuantity(
-                    path, "Poisson ratio of the gel", "", material.elasticity.poisson_ratio, 0.4,
-                    MAX_POISSON_RATIO, POISSON_RANGE, False, True, True,
-                )
+            yield FitQuantity(
+                f"materials.{name}.elasticity.poisson_ratio", "Poisson ratio of the gel", "",
+                material.elasticity.poisson_ratio, 0.4, MAX_POISSON_RATIO, POISSON_RANGE,
+                renders=True, moves_contacts=True,
             )  # fmt: skip
-    return found
 
 
-def _coating(design: SensorDesign) -> list[FitQuantity]:
+def _coating(design: SensorDesign) -> Iterator[FitQuantity]:
     coating = design.coating
     if not isinstance(coating, Coating):
-        return []
-    brightest = max(coating.reflectance)
-    found = [
-        FitQuantity(
-            "coating.specularity", "specularity of the coating", "", coating.specularity, 0.0, 1.0,
-            SPECULAR_RANGE, renders=True,
-        )
-    ]  # fmt: skip
+        return
+    yield FitQuantity(
+        "coating.specularity", "specularity of the coating", "", coating.specularity, 0.0, 1.0,
+        SPECULAR_RANGE, renders=True,
+    )  # fmt: skip
     if coating.specularity > 0.0:  # without flake, pictures do not show its roughness
-        alpha = coating.reflection().roughness
-        found.append(
-            FitQuantity(
-                "coating.roughness", "roughness (GGX alpha) of the coating's flake", "", alpha,
-                SMALLEST_ROUGHNESS, 1.0, ALPHA_RANGE, renders=True,
-            )
+        yield FitQuantity(
+            "coating.roughness", "roughness (GGX alpha) of the coating's flake", "",
+            coating.reflection().roughness, SMALLEST_ROUGHNESS, 1.0, ALPHA_RANGE, renders=True,
         )  # fmt: skip
+    brightest = max(coating.reflectance)
     if brightest > 0.0:
-        found.append(
-            FitQuantity(
-                "coating.brightness", "reflectance of the coating, times", "", 1.0, 0.2,
-                1.0 / brightest, REFLECTANCE_RANGE, True, True, False,
-                _body_changes.with_reflectance, "coating.reflectance",
-            )
+        yield FitQuantity(
+            "coating.brightness", "reflectance of the coating, times", "", 1.0, 0.2,
+            1.0 / brightest, REFLECTANCE_RANGE, True, renders=True,
+            change=_body_changes.with_reflectance, home="coating.reflectance",
         )  # fmt: skip
-    return found
 
 
-def _edges(design: SensorDesign) -> list[FitQuantity]:
+def _edges(design: SensorDesign) -> Iterator[FitQuantity]:
     parts = _body_changes.edge_parts(design)
-    if not parts:
-        return []
-
-    known = _body_changes.edge_roughness(design, parts)
-
-    def rough(changed: SensorDesign, value: float) -> SensorDesign:
-        return _body_changes.with_edge_roughness(changed, parts, value)
-
-    return [
-        FitQuantity(
+    if parts:
+        known = _body_changes.edge_roughness(design, parts)
+        yield FitQuantity(
             f"parts.{parts[0]}.edges", "roughness (GGX alpha) of the edges of rigid parts", "",
-            ROUGH_START if known is None else known, 0.0, 1.0, ROUGH_RANGE, False, True, False,
-            rough,
-            f"parts.{parts[0]}.faces",
-            guessed=known is None,
-        )
-    ]  # fmt: skip
+            ROUGH_START if known is None else known, 0.0, 1.0, ROUGH_RANGE, renders=True,
+            change=partial(_body_changes.with_edge_roughness, parts),
+            home=f"parts.{parts[0]}.faces", guessed=known is None,
+        )  # fmt: skip
 
 
 def _indices(design: SensorDesign) -> list[FitQuantity]:

@@ -344,7 +344,7 @@ def test_a_power_is_found_relative_to_powers_that_are_kept(
 
 def test_a_row_of_lights_that_lies_lower_is_found(mini: OpticalModel) -> None:
     lower = -0.8  # mm; more than twice the step of the difference quotients
-    real = ots.OpticalModel(with_lights_moved(mini.design, "blue", lower))
+    real = ots.OpticalModel(with_lights_moved("blue", mini.design, lower))
     shown = photograph_model(real, BALLS[:2], resolution=SMALLER, photons=200_000, seed=5)
     settings = CalibrationSettings(
         families=chosen_families([], ["lights"]), rounds=3, photons=200_000, held_out=()
