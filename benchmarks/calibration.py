@@ -24,9 +24,14 @@ from benchmarks.results import measure_parts, page_head
 from optisense.calibration import PhotographedPress, Photographs, calibrate, photograph_model
 from optisense.calibration._fit_rounds import AGAIN
 from optisense.calibration._gauss_newton import LayeredFit
-from optisense.calibration._layered_pictures import LayeredPictures, averaged, layered_pictures
 from optisense.calibration.families import USUAL
-from optisense.calibration.model_pictures import levels_of, matched_exposure
+from optisense.calibration.model_pictures import (
+    LayeredPictures,
+    averaged,
+    layered_pictures,
+    levels_of,
+    matched_exposure,
+)
 from optisense.calibration.quantities import chain_with, designed, power_factors, quantities_of
 from optisense.calibration.quantity import FitQuantity
 from optisense.calibration.result import with_known_total

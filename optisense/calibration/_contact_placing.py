@@ -14,8 +14,7 @@ import numpy as np
 
 from optisense.array_types import FloatArray
 from optisense.calibration._gauss_newton import LayeredFit
-from optisense.calibration._layered_pictures import layered_pictures
-from optisense.calibration.model_pictures import matched_exposure
+from optisense.calibration.model_pictures import layered_pictures, matched_exposure
 from optisense.calibration.photographs import Photographs
 from optisense.calibration.seen_contacts import SeenContact
 from optisense.kept_arrays import NOTHING_KEPT, KeptArrays

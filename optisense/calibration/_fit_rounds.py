@@ -17,16 +17,16 @@ from optisense.calibration._contact_placing import (
 )
 from optisense.calibration._covered_view import CoveredView
 from optisense.calibration._gauss_newton import LayeredFit
-from optisense.calibration._layered_pictures import (
+from optisense.calibration._least_squares import Solution
+from optisense.calibration._view_slopes import view_changes, with_view
+from optisense.calibration.families import EXPOSURE
+from optisense.calibration.model_pictures import (
     LayeredPictures,
     PictureSlopes,
     averaged,
     layered_pictures,
+    matched_exposure,
 )
-from optisense.calibration._least_squares import Solution
-from optisense.calibration._view_slopes import view_changes, with_view
-from optisense.calibration.families import EXPOSURE
-from optisense.calibration.model_pictures import matched_exposure
 from optisense.calibration.photographs import Photographs
 from optisense.calibration.quantities import designed, fits_all_powers
 from optisense.calibration.quantity import FitQuantity

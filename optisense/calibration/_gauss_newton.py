@@ -24,11 +24,6 @@ from optisense.array_types import FloatArray
 from optisense.calibration._covered_view import outline_of, with_smooth_outline
 from optisense.calibration._error_scales import HUBER, Scales, expected_errors
 from optisense.calibration._far_field import without_drift
-from optisense.calibration._layered_pictures import (
-    LayeredPictures,
-    PictureSlopes,
-    contact_slopes,
-)
 from optisense.calibration._least_squares import (
     LinearEquations,
     Solution,
@@ -37,7 +32,12 @@ from optisense.calibration._least_squares import (
     normal_equations,
     slope_reduction,
 )
-from optisense.calibration.model_pictures import levels_of
+from optisense.calibration.model_pictures import (
+    LayeredPictures,
+    PictureSlopes,
+    contact_slopes,
+    levels_of,
+)
 from optisense.calibration.photographs import Photographs
 from optisense.calibration.quantities import chain_with, power_factors
 from optisense.calibration.quantity import FitQuantity

@@ -19,7 +19,7 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 
 from optisense.array_types import FloatArray
 from optisense.calibration._covered_view import CoveredView, outline_of
-from optisense.calibration._layered_pictures import LayeredPictures
+from optisense.calibration.model_pictures import LayeredPictures
 from optisense.calibration.seen_contacts import SeenContact
 
 if TYPE_CHECKING:

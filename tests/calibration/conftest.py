@@ -12,8 +12,8 @@ import pytest
 import optisense as ots
 from optisense.calibration import Photographs, photograph_model
 from optisense.calibration._fit_rounds import FitRounds
-from optisense.calibration._layered_pictures import LayeredPictures, layered_pictures
 from optisense.calibration.comparing import usable
+from optisense.calibration.model_pictures import LayeredPictures, layered_pictures
 from optisense.calibration.quantities import designed
 from optisense.calibration.quantity import FitQuantity
 from optisense.calibration.result import FittedNumber, fitted_numbers, with_known_total

@@ -16,10 +16,10 @@ import optisense as ots
 from optisense.calibration import Photographs, photograph_model, save_photographs
 from optisense.calibration._body_changes import with_lights_moved, with_single_lights
 from optisense.calibration._gauss_newton import LayeredFit
-from optisense.calibration._layered_pictures import LayeredPictures, layered_pictures
 from optisense.calibration._least_squares import Solution
 from optisense.calibration.calibrating import _with_exposure, calibrate
 from optisense.calibration.families import chosen_families
+from optisense.calibration.model_pictures import LayeredPictures, layered_pictures
 from optisense.calibration.quantities import designed, quantities_of
 from optisense.calibration.realism import Realism, distances
 from optisense.calibration.result import (

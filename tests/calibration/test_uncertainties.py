@@ -11,8 +11,8 @@ from scipy.ndimage import gaussian_filter
 import optisense as ots
 from optisense.calibration import Photographs
 from optisense.calibration._gauss_newton import LayeredFit
-from optisense.calibration._layered_pictures import LayeredPictures, PictureSlopes, averaged
 from optisense.calibration._least_squares import jackknife_covariance
+from optisense.calibration.model_pictures import LayeredPictures, PictureSlopes, averaged
 from optisense.calibration.quantities import quantities_of
 from optisense.calibration.seen_contacts import SeenContact
 

@@ -12,8 +12,8 @@ import optisense as ots
 from optisense.calibration import photograph_model
 from optisense.calibration._covered_view import CoveredView, with_smooth_outline
 from optisense.calibration._fit_rounds import FitRounds
-from optisense.calibration._layered_pictures import LayeredPictures
 from optisense.calibration._view_slopes import displacements, view_changes
+from optisense.calibration.model_pictures import LayeredPictures
 from optisense.calibration.quantities import designed, quantities_of
 from optisense.calibration.seen_contacts import SeenContact
 from optisense.calibration.settings import CalibrationSettings
