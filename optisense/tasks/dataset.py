@@ -40,7 +40,10 @@ LATER_ARRAYS: ArrayKinds = {
 pressure, penetration and displacement."""
 
 BACKGROUND_ARRAYS: ArrayKinds = {"image": ("u", 3), "points": ("f", 3), "normals": ("f", 3)}
+"""Those of the arrays of `BACKGROUND`."""
+
 CAMERA_ARRAYS: ArrayKinds = {"points": ("f", 3), "directions": ("f", 3)}
+"""Those of the arrays of `CAMERA`."""
 
 
 @dataclass(frozen=True)
