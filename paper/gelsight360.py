@@ -117,27 +117,17 @@ def steps(settings: Values) -> Steps:
         )
         for seed in seeds
     ]
-    everything = [
-        Unit(
-            searched,
-            {
-                "design": sensor(SENSOR),
-                "space": {"lights.lg*.colour": ["R", "G", "B"]},
-                "objectives": goals,
-                "method": "light-colours",
-                "seed": 0,
-                "settings": {
-                    "photons": settings["all_photons"],
-                    "resolution": settings["resolution"],
-                    "least_pixels": settings["least_pixels"],
-                },
-                "all": True,
-            },
-            "all 6,561 colourings",
-        )
-    ]
-    if not settings["all_photons"]:
-        everything = []
+    search = {
+        "design": sensor(SENSOR),
+        "space": {"lights.lg*.colour": ["R", "G", "B"]},
+        "objectives": goals,
+        "method": "light-colours",
+        "seed": 0,
+        "settings": {**judged, "photons": settings["all_photons"]},
+        "all": True,
+    }
+    asks_all = bool(settings["all_photons"])
+    everything = [Unit(searched, search, "all 6,561 colourings")] if asks_all else []
     tips = [
         score_unit(
             sensor(SENSOR, tip_design=float(tip)),
@@ -240,46 +230,29 @@ def notes(numbers: Values) -> list[str]:
 
 def tables(numbers: Values) -> list[Table]:
     """Return tables of colourings, the best of all, tips, resins, and what NormDiff depends on."""
-    found = [
+    colourings, resins = numbers["colourings"], numbers["resins"]
+    return [
         Table(
             "Colourings of the paper's table (in brackets the paper's scores)",
             ["colouring", *OBJECTIVES.values()],
             [
                 [letters, *(f"{shown(each[n], 4)} ({PAPER[letters][n]:g})" for n in OBJECTIVES)]
-                for letters, each in numbers["colourings"].items()
+                for letters, each in colourings.items()
             ],
-        )
-    ]
-    found.append(
+        ),
         Table(
             "The same colourings by other definitions of NormDiff; the last row is the rank "
             "correlation with the paper's scores",
             ["colouring", *BLIND],
             [
-                [letters, *(shown(each["ways"][way]) for way in BLIND)]
-                for letters, each in numbers["colourings"].items()
-            ]
-            + [["correlation", *(_correlation(numbers["colourings"], way) for way in BLIND)]],
-        )
-    )
-    if numbers["all"]:
-        every = numbers["all"]
-        found.append(
-            Table(
-                f"All {every['colourings']:,} colourings, one seed",
-                ["objective", "best", "best score", "median", "worst", "rank of RGBRGBRG"],
-                [
-                    [
-                        title,
-                        every[name]["best"],
-                        *(number(every[name][key], 4) for key in ("score", "median", "worst")),
-                        f"{every[name]['ranks'].get('RGBRGBRG', 0):,}",
-                    ]
-                    for name, title in OBJECTIVES.items()
-                ],
-            )
-        )
-    found.append(
+                *(
+                    [name, *(shown(c["ways"][way]) for way in BLIND)]
+                    for name, c in colourings.items()
+                ),
+                ["correlation", *(_correlation(colourings, way) for way in BLIND)],
+            ],
+        ),
+        *([_table_of_all(numbers["all"])] if numbers["all"] else []),
         Table(
             "Tips by 2to3PW (which uses no random numbers: ± is over grids of chief rays)",
             ["tip", "2to3PW", "with triangles across folds and gaps"],
@@ -287,10 +260,7 @@ def tables(numbers: Values) -> list[Table]:
                 [tip, shown(each), shown(numbers["tips_with_leaps"][tip])]
                 for tip, each in numbers["tips"].items()
             ],
-        )
-    )
-    resins = numbers["resins"]
-    found.append(
+        ),
         Table(
             "Resins",
             ["resin", *OBJECTIVES.values()],
@@ -298,23 +268,31 @@ def tables(numbers: Values) -> list[Table]:
                 [resin, *(shown(resins[name][resin]) for name in OBJECTIVES)]
                 for resin in resins["normdiff"]
             ],
-        )
-    )
-    found.append(
+        ),
         Table(
             "NormDiff of other lights, coatings, resolutions and numbers of photons (one seed)",
             ["sensor", *BLIND, "pixels of the smallest contact"],
             [
-                [
-                    name,
-                    *(number(each["scores"].get(way)) for way in BLIND),
-                    str(each["pixels"]),
-                ]
+                [name, *(number(each["scores"].get(way)) for way in BLIND), str(each["pixels"])]
                 for name, each in numbers["why"].items()
             ],
-        )
-    )
-    return found
+        ),
+    ]
+
+
+def _table_of_all(every: Values) -> Table:
+    """Return the table of the best of all colourings."""
+    rows = [
+        [
+            title,
+            every[name]["best"],
+            *(number(every[name][key], 4) for key in ("score", "median", "worst")),
+            f"{every[name]['ranks'].get('RGBRGBRG', 0):,}",
+        ]
+        for name, title in OBJECTIVES.items()
+    ]
+    heads = ["objective", "best", "best score", "median", "worst", "rank of RGBRGBRG"]
+    return Table(f"All {every['colourings']:,} colourings, one seed", heads, rows)
 
 
 def _correlation(colourings: Values, way: str) -> str:

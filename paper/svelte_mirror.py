@@ -142,7 +142,7 @@ def _numbers(
         "first": ["first"],
         **{m: [name for name in scored if name.startswith(f"{m},")] for m in METHODS},
     }
-    found: Values = {
+    return {
         "mirrors": {
             name: {
                 "aoap": spread_of("aoap", [scored[name] for name in names]),
@@ -166,7 +166,6 @@ def _numbers(
             record.values.get("failed", 0) for records in by_method.values() for record in records
         ),
     }
-    return found
 
 
 def claims(numbers: Values) -> list[Claim]:
@@ -174,7 +173,8 @@ def claims(numbers: Values) -> list[Claim]:
     mirrors = numbers["mirrors"]
     first, best = mirrors["first"]["aoap"], mirrors["cma-es"]["aoap"]
     gradient = mirrors["gradient"]["aoap"]
-    found = [
+    before, after = (mirrors[name]["stretch"] for name in ("first", "cma-es"))
+    return [
         Claim(
             f"AOAP of the first mirror is {FIRST:g}.",
             shown(first),
@@ -190,9 +190,6 @@ def claims(numbers: Values) -> list[Claim]:
             "The paper gives neither the number of trials nor the population size. A search that "
             "stops earlier reaches a lower score. The coverage, which hardly counts, also differs.",
         ),
-    ]
-    before, after = (mirrors[name]["stretch"] for name in ("first", "cma-es"))
-    found.append(
         Claim(
             "With the optimised mirror, objects look hardly distorted.",
             f"a round object looks {shown(before)} times as long as wide before the search, and "
@@ -205,9 +202,8 @@ def claims(numbers: Values) -> list[Claim]:
             "also raises the score if more pixels see the skin (see the table), which stretches "
             "the image across the finger. The paper shows the result for the middle of a "
             "simplified surface.",
-        )
-    )
-    return found
+        ),
+    ]
 
 
 def _near(found: Spread, value: float) -> bool | None:
