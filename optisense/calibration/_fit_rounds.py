@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from optisense.array_types import FloatArray
-from optisense.calibration._contact_placing import (
+from optisense.calibration._covered_view import CoveredView
+from optisense.calibration._gauss_newton import LayeredFit
+from optisense.calibration._least_squares import Solution
+from optisense.calibration._view_slopes import view_changes, with_view
+from optisense.calibration.comparing import (
     FIT_WIDTH,
     moved_contact,
     placed,
     scaled_contact,
 )
-from optisense.calibration._covered_view import CoveredView
-from optisense.calibration._gauss_newton import LayeredFit
-from optisense.calibration._least_squares import Solution
-from optisense.calibration._view_slopes import view_changes, with_view
 from optisense.calibration.families import EXPOSURE
 from optisense.calibration.model_pictures import (
     LayeredPictures,

@@ -1,15 +1,28 @@
-"""Comparison of a design with photographs of the real sensor."""
+"""Comparison of a design with photographs of the real sensor, and the places of their contacts.
+
+A contact that is found in a photograph alone is off by a few pixels, which changes the response as
+much as a good model's errors do; so it is placed by the pictures of the model.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from optisense.calibration._contact_placing import FIT_WIDTH, placed, scaled_contact
+import numpy as np
+
+from optisense.array_types import FloatArray
 from optisense.calibration._cross_readings import realism_and_readings
+from optisense.calibration._gauss_newton import LayeredFit
 from optisense.calibration._orientation import orientation_notes
-from optisense.calibration.model_pictures import ModelPictures, model_pictures
+from optisense.calibration.model_pictures import (
+    ModelPictures,
+    layered_pictures,
+    matched_exposure,
+    model_pictures,
+)
 from optisense.calibration.photographs import Photographs
 from optisense.calibration.realism import Realism
 from optisense.calibration.seen_contacts import (
@@ -18,10 +31,31 @@ from optisense.calibration.seen_contacts import (
     check_shape,
 )
 from optisense.errors import CalibrationError
+from optisense.kept_arrays import NOTHING_KEPT, KeptArrays
 from optisense.quality import PICTURE_PHOTONS
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
+
+
+FIT_WIDTH = 160
+"""Width of the pictures of a fit, in pixels: a quarter of the pixels of those that are compared in
+the end, and enough for the smooth responses of balls.
+"""
+
+MOST_PLACINGS = 6
+"""Largest number of renderings by which a contact is placed. Two are enough for most contacts, but
+at the edge of the picture each one moves a contact by half as much as the one before.
+"""
+
+SETTLED = 0.25
+"""Change of a contact's position and radius, pixels of the fit, below which it is placed: the
+photographs' noise hides smaller ones.
+"""
+
+WIDEST_CHANGE = 0.5
+"""Largest change of the logarithm of a contact's radius at once, a factor of 1.6. Contacts that are
+found in photographs are off by a tenth; a larger change is a failure of the fit."""
 
 
 @dataclass(frozen=True)
@@ -100,3 +134,60 @@ def compare(
     figures = realism_and_readings(model, kept, seen, pictures)
     notes += orientation_notes(kept, seen, pictures)
     return Comparison(kept, tuple(seen), pictures, figures, tuple(notes))
+
+
+def placed(
+    model: OpticalModel,
+    photographs: Photographs,
+    seen: Sequence[SeenContact],
+    *,
+    photons: int,
+    seed: int,
+    exposure: float | None = None,
+    kept: KeptArrays = NOTHING_KEPT,
+) -> list[SeenContact]:
+    """Return the contacts where the model's responses are closest to the photographs', which have
+    the size of a fit.
+
+    The exposure is a factor on the radiance; if None, it brings the background closest. A contact
+    that is not on the model's skin raises CalibrationError.
+    """
+    found = list(seen)
+    moving = list(range(len(found)))
+    none: FloatArray = np.zeros(0)
+    for _ in range(MOST_PLACINGS):
+        some, places = photographs.subset(moving), [found[index] for index in moving]
+        layers = layered_pictures(model, some, places, photons, seed, kept=kept)
+        if exposure is None:
+            total = layers.background.sum(axis=0)
+            exposure = matched_exposure(total, layers.chain, photographs.background)
+        fit = LayeredFit(some, places, layers, [], exposure, none, {})
+        solution = fit.solve(none, np.zeros((len(places), 3)))
+        for index, place, amount in zip(moving, places, solution.contacts, strict=True):
+            found[index] = moved_contact(place, amount)
+        moving = [
+            index
+            for index, place in zip(moving, places, strict=True)
+            if _change(place, found[index]) >= SETTLED
+        ]
+        if not moving:
+            break
+    return found
+
+
+def _change(one: SeenContact, other: SeenContact) -> float:
+    """Return the larger change of position and radius, pixels."""
+    return max(math.dist(one.centre, other.centre), abs(one.radius - other.radius))
+
+
+def scaled_contact(place: SeenContact, factor: float) -> SeenContact:
+    """Return a contact in a picture whose width is multiplied by a factor."""
+    column, row = place.centre
+    return SeenContact((column * factor, row * factor), place.radius * factor)
+
+
+def moved_contact(place: SeenContact, amount: FloatArray) -> SeenContact:
+    """Return a contact after a change (3,) of column, row (pixels) and the radius's logarithm."""
+    column, row, wider = (float(value) for value in amount)
+    grown = place.radius * math.exp(min(max(wider, -WIDEST_CHANGE), WIDEST_CHANGE))
+    return SeenContact((place.centre[0] + column, place.centre[1] + row), grown)
