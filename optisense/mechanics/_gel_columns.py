@@ -46,10 +46,14 @@ column is added there; nearer, the column moves to the border. With a tenth, for
 LEAST_UPRIGHT = 0.5
 """Cosine of the steepest slope of the skin against the tangent plane that is modelled, 60 degrees;
 beyond it a dome's skin is too steep for columns over the tangent plane."""
+TILE = 2.0
+"""Side of the cubes whose columns are traced together, over the longest column. It bounds the
+number of faces that are tested: those within three lengths of a column."""
 LEAST_LEAVING = -0.5
-"""Smallest cosine between the normal of a face and the mean direction of the columns at which the
-face is tested. Lines leave the base of a gel nearly at right angles, and single lines differ from
-their mean by up to 60 degrees; the skin itself, which is left out, faces them."""
+"""Smallest cosine between the normal of a face and the mean direction of the lines of a tile at
+which the face is tested. Lines leave the base of a gel nearly at right angles, and single lines of
+a tile differ from their mean by up to 60 degrees; the skin itself, which is left out, faces
+them."""
 ASIDE = 1e-6
 """Distance by which the lines of columns at the border of the gel start inside of it, over the
 thickness: far above the rounding of double precision, and below any distance that matters."""
@@ -326,19 +330,27 @@ def _lengths(
     result = np.full(len(starts), np.inf)
     if not len(starts):
         return result
-    ends = np.concatenate([starts, starts + longest * ways])
-    low, high = ends.min(axis=0), ends.max(axis=0)
-    parts = []
-    for body in bodies:
-        lowest, highest = body.face_bounds
-        near = ((highest >= low) & (lowest <= high)).all(axis=1)
-        if len(bodies) == 1:
-            # Lines leave through faces that point the same way; they meet the skin from behind.
-            near &= body.face_normals @ ways.mean(axis=0) > LEAST_LEAVING
-        if near.any():
-            parts.append(body.with_faces(body.faces[near]))
-    found = exits(parts, starts, ways) if parts else result
-    return np.where(found <= longest, found, np.inf)
+    tiles = np.floor(starts / (TILE * longest)).astype(np.int64)
+    _, tile = np.unique(tiles, axis=0, return_inverse=True)
+    order = np.argsort(tile.ravel(), kind="stable")
+    groups = np.split(order, np.flatnonzero(np.diff(tile.ravel()[order])) + 1)
+    for group in groups:
+        way = ways[group]
+        ends = np.concatenate([starts[group], starts[group] + longest * way])
+        low, high = ends.min(axis=0), ends.max(axis=0)
+        parts = []
+        for body in bodies:
+            lowest, highest = body.face_bounds
+            near = ((highest >= low) & (lowest <= high)).all(axis=1)
+            if len(bodies) == 1:
+                # Lines leave through faces that point the same way; they meet the skin from behind.
+                near &= body.face_normals @ way.mean(axis=0) > LEAST_LEAVING
+            if near.any():
+                parts.append(body.with_faces(body.faces[near]))
+        if parts:
+            found = exits(parts, starts[group], way)
+            result[group] = np.where(found <= longest, found, np.inf)
+    return result
 
 
 def _folded(top: FloatArray, inward: FloatArray, length: FloatArray) -> BoolArray:
