@@ -11,6 +11,7 @@ the middle one has weight 1/2 at its own place.
 from __future__ import annotations
 
 import math
+import threading
 import weakref
 
 import numpy as np
@@ -30,6 +31,10 @@ MOST_KEPT_WEIGHTS = 4_000_000
 """Number of weights (vertices times control points) of a mesh above which they are computed again
 instead of being kept: 32 MB, as for a mesh of 25,000 vertices in a cage of 160 points."""
 
+KEPT_WEIGHTS = 32_000_000
+"""Total number of weights that are kept (256 MB), those of eight such meshes; the oldest are
+dropped first."""
+
 _VALUES_AT_ONCE = 4_000_000
 """Number of products of basis functions that are computed together, which bounds the memory of the
 arrays to 32 MB."""
@@ -42,6 +47,7 @@ _weights: weakref.WeakKeyDictionary[TriangleMesh, tuple[object, FloatArray]]
 _weights = weakref.WeakKeyDictionary()
 _last: weakref.WeakKeyDictionary[TriangleMesh, tuple[object, TriangleMesh]]
 _last = weakref.WeakKeyDictionary()
+_lock = threading.Lock()
 
 
 def cage_points(box: ArrayLike, resolution: Resolution) -> FloatArray:
@@ -124,7 +130,7 @@ def _bent(
 
 def kept_weights(mesh: TriangleMesh, box: ArrayLike, resolution: Resolution) -> FloatArray:
     """Return the read-only `cage_weights` (n, nx * ny * nz) of the n vertices of a mesh at rest,
-    which are kept for the next call with the same mesh.
+    which are kept for the next call with the same mesh, up to `KEPT_WEIGHTS` of all meshes.
 
     Raises:
         DesignError: a vertex lies outside the box.
@@ -134,7 +140,11 @@ def kept_weights(mesh: TriangleMesh, box: ArrayLike, resolution: Resolution) -> 
     if kept is None or kept[0] != key:
         weights = np.asfortranarray(cage_weights(mesh.vertices, box, resolution))
         weights.flags.writeable = False
-        kept = _weights[mesh] = key, weights
+        kept = key, weights
+        with _lock:
+            _weights[mesh] = kept
+            while sum(each.size for _, each in _weights.values()) > KEPT_WEIGHTS:
+                del _weights[next(iter(_weights))]
     return kept[1]
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from optisense.errors import DesignError
-from optisense.geometry import TriangleMesh, cage_points, cage_weights, deform
+from optisense.geometry import TriangleMesh, cage, cage_points, cage_weights, deform
 from optisense.geometry.cage import (
     MOST_KEPT_WEIGHTS,
     deformed,
@@ -123,6 +123,15 @@ def test_weights_are_kept_and_told_apart_by_box_and_resolution() -> None:
     assert kept_weights(mesh, BOX, (3, 4, 3)).shape[1] == 36
     with pytest.raises(ValueError, match="read-only"):
         weights[0, 0] = 2.0
+
+
+def test_the_oldest_of_many_weights_are_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
+    meshes = [box_mesh() for _ in range(3)]
+    monkeypatch.setattr(cage, "KEPT_WEIGHTS", 2 * 27 * len(meshes[0].vertices))
+    first, *others = [kept_weights(mesh, BOX, (3, 3, 3)) for mesh in meshes]
+    for mesh, weights in zip(meshes[1:], others, strict=True):
+        assert kept_weights(mesh, BOX, (3, 3, 3)) is weights
+    assert kept_weights(meshes[0], BOX, (3, 3, 3)) is not first
 
 
 def test_a_fine_cage_without_kept_weights_agrees_with_one_that_keeps_them() -> None:
