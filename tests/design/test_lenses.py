@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import optisense as ots
-from optisense.design import Camera, SensorDesign, check_design
+from optisense.design import Camera, SensorDesign, check_design, projection
 from optisense.design.lenses.blur import Defocus, GaussianBlur, blurred
 from optisense.design.lenses.distortion import BrownConrady, KannalaBrandt, LensDistortion
 from optisense.design.lenses.film import film_places
@@ -115,6 +115,18 @@ def test_a_lens_that_folds_is_found_where_it_folds() -> None:
     assert folding_angle(design.camera) == pytest.approx(45.0, abs=0.2)
     problems = [each for each in check_design(design) if each.severity == "error"]
     assert len(problems) == 1 and "folds 45 degrees off its axis" in problems[0].message
+
+
+def test_a_lens_is_searched_for_folds_once() -> None:
+    lens = {"kind": "brown-conrady", "k1": -1.0 / 3.0, "k2": 1e-4}
+    camera = mini(distortion=lens, fov=75.0).camera
+    searched = projection._folding_angle.cache_info().misses
+    first = folding_angle(camera)
+    camera.position = (0.0, 0.0, 1.0)
+    assert folding_angle(camera) == first is not None
+    assert projection._folding_angle.cache_info().misses == searched + 1
+    camera.fov = 40.0
+    assert folding_angle(camera) is None
 
 
 def test_a_lens_that_is_nearly_flat_on_the_way_to_the_corners_does_not_fold() -> None:
