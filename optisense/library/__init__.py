@@ -3,6 +3,7 @@
 from optisense.design.materials import flake_lobe, specularity_to_roughness
 from optisense.library._designs import (
     OVERDRIVEN,
+    NominalFlux,
     nominal_flux,
     typical_colour,
     unused_imaging,
@@ -38,6 +39,7 @@ __all__ = [
     "CameraModel",
     "Entry",
     "LightEntry",
+    "NominalFlux",
     "Source",
     "TypicalLight",
     "add_file",

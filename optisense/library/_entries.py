@@ -186,7 +186,7 @@ class LensFacts(Model):
         across, down = self.resolution
         return width, max(1, round(width * down / across))
 
-    def misfit(self) -> tuple[str, str] | None:
+    def _misfit(self) -> tuple[str, str] | None:
         """Return the problem of a field of view that does not fit the focal length and image width,
         and its remedy.
 
@@ -244,7 +244,7 @@ class CameraModel(ImagingModel, LensFacts):
     @model_validator(mode="after")
     def _check_consistent(self) -> CameraModel:
         check_projection(self.projection, self.fov, self.distortion)
-        misfit = self.misfit()
+        misfit = self._misfit()
         if misfit is not None:
             raise InconsistentValueError(misfit[0], ("fov",), misfit[1])
         return self

@@ -36,10 +36,10 @@ class Placement:
         layer: "top", or "bottom" for LEDs that face away from the board's first one.
         on_board: x and y on the board seen from in front of its top, mm: y is up at rest, the
             origin is the projection of the design's origin along the normal.
-        turn_on_board: rotation in degrees, counter-clockwise, seen from in front of the board's
-            top, 0 to 360.
         colour: R, G, B, as in the design.
         flux: radiant flux, mW.
+        turn_on_board: rotation in degrees, counter-clockwise, seen from in front of the board's
+            top, 0 to 360.
     """
 
     designator: str
@@ -52,9 +52,9 @@ class Placement:
     board: int
     layer: str
     on_board: tuple[float, float]
-    turn_on_board: float
     colour: tuple[float, float, float]
     flux: float
+    turn_on_board: float
 
 
 def placements(design: SensorDesign) -> list[Placement]:
@@ -80,9 +80,9 @@ def placements(design: SensorDesign) -> list[Placement]:
                 board=place.board,
                 layer="bottom" if place.bottom else "top",
                 on_board=(float(position @ place.right), float(position @ place.up)),
-                turn_on_board=float(turn % 360.0),
                 colour=group.colour,
                 flux=group.flux,
+                turn_on_board=float(turn % 360.0),
             )
         )
     return found
