@@ -38,7 +38,7 @@ from optisense.sensors._gelbelt_checks import (
 )
 from optisense.sensors._gelbelt_sources import gelbelt_sources
 from optisense.sensors._shapes import axial_camera, ribbon, rod, row_of_lights, strip
-from optisense.sensors._sources import nominal_flux
+from optisense.sensors._sources import nominal_fluxes
 from optisense.sensors.dimensions import (
     Dimensions,
     Length,
@@ -157,7 +157,7 @@ def gelbelt(size: GelBeltDimensions) -> SensorDesign:
     """
     led_flux = size.led_flux
     if led_flux is None:
-        most = nominal_flux(LED, "green")
+        most = nominal_fluxes(LED)["green"]
         led_flux = round(most / GREEN_LEAD, 3), most, round(most / GREEN_LEAD, 3)
     check_numbers(
         size.light_design,

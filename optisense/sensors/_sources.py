@@ -53,22 +53,16 @@ def balanced_flux(model: str) -> float:
     board of GraspEveryThing has 45, 400 and 600 ohm for red, green and blue): the weakest colour
     runs at its nominal current.
     """
-    return min(_nominal(model).values())
+    return min(nominal_fluxes(model).values())
 
 
-def nominal_flux(model: str, colour: str) -> float:
-    """Return the radiant flux of one colour ("red", ...) of an LED at its nominal current, mW."""
-    return _nominal(model)[colour]
+def nominal_fluxes(model: str) -> dict[str, float]:
+    """Return the radiant flux of each colour ("red", ...) of an LED of the library at its nominal
+    current, mW.
 
-
-def package(model: str) -> tuple[float, float, float]:
-    """Return width, length and height of an LED's body, as in the library, mm."""
-    entry = library.entry("light", model)
-    assert isinstance(entry, LightEntry) and entry.package is not None
-    return entry.package
-
-
-def _nominal(model: str) -> dict[str, float]:
+    Raises:
+        DesignError: the library states none.
+    """
     entry = library.entry("light", model)
     assert isinstance(entry, LightEntry)
     known = {name: light.flux for name, light in entry.typical.items() if light.flux is not None}
@@ -77,3 +71,10 @@ def _nominal(model: str) -> dict[str, float]:
             f"the library knows no flux of the light '{model}'", hint="Give led_flux in mW"
         )
     return known
+
+
+def package(model: str) -> tuple[float, float, float]:
+    """Return width, length and height of an LED's body, as in the library, mm."""
+    entry = library.entry("light", model)
+    assert isinstance(entry, LightEntry) and entry.package is not None
+    return entry.package
