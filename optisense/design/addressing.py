@@ -72,10 +72,12 @@ def set_values(design: SensorDesign, values: Mapping[str, object]) -> SensorDesi
         *way, last = parse_path(path)
         for step in way:
             target = target[key_of(target, step)]
-        plain, key = _plain(value), key_of(target, last)
+        plain: Any = _plain(value)
+        key = key_of(target, last)
         if path in models and target[key] != plain:
-            target.update(of_model(str(plain)))
-        target[key] = plain
+            target.update(of_model(plain))
+        else:
+            target[key] = plain
     edited = design._replaced(data, where=", ".join(values))
     for path in changed_paths(design, edited, design.provenance):
         edited.provenance.pop(path, None)
