@@ -96,11 +96,9 @@ class LampImages:
         if self._found is None:
             height = max(1, round(SEARCH_WIDTH * camera.height / camera.width))
             small = replace(camera, width=SEARCH_WIDTH, height=height)
-            everywhere = np.ones((height, SEARCH_WIDTH), dtype=bool)
 
             def meet(glare: bool) -> bool:
-                layers, _ = self._traced(small, everywhere, LAMP_PATHS, 0, glare)
-                return bool(layers.any())
+                return bool(self._traced(small, 0, glare)[0].any())
 
             exist = self._windows.exist
             self._found = exist and meet(False), exist and self._scene.rough and meet(True)
@@ -108,23 +106,19 @@ class LampImages:
             return None
         key = camera.width, camera.height, seed
         if self._kept is None or self._kept[0] != key:
-            everywhere = np.ones((camera.height, camera.width), dtype=bool)
-            paths = max(1, round(LAMP_PATHS * SEARCH_WIDTH / camera.width))
             mirrored, glare = self._found
-            layers = np.zeros((self._groups, *everywhere.shape, 3), dtype=np.float32)
+            layers = np.zeros((self._groups, camera.height, camera.width, 3), dtype=np.float32)
             if mirrored:
-                layers += self._mirrored(camera, everywhere, paths, seed)
+                layers += self._mirrored(camera, seed)
             if glare:
-                layers += self._glare(camera, everywhere, paths, seed)
+                layers += self._glare(camera, seed)
             self._kept = key, layers
         return self._kept[1]
 
-    def _mirrored(
-        self, camera: RayCamera, everywhere: NDArray[np.bool_], paths: int, seed: int
-    ) -> NDArray[np.float32]:
-        """Return the layers of mirror images, by a number of paths through each pixel."""
-        layers, _ = self._traced(camera, everywhere, paths, seed_of(seed, 11))
-        lone = np.zeros_like(everywhere)
+    def _mirrored(self, camera: RayCamera, seed: int) -> NDArray[np.float32]:
+        """Return the layers of mirror images."""
+        layers, _ = self._traced(camera, seed_of(seed, 11))
+        lone = np.zeros(layers.shape[1:3], dtype=bool)
         for layer in layers:
             bright = layer.sum(axis=-1)
             lone |= _left_of_lone(bright) < bright
@@ -132,20 +126,18 @@ class LampImages:
             return layers
         beside = np.ones((3, 3), dtype=bool)
         around = ndimage.binary_dilation(lone, beside)
-        again, meetings = self._traced(camera, around, GLINT_PATHS, seed_of(seed, 12))
+        again, meetings = self._traced(camera, seed_of(seed, 12), around=around)
         steady = around & (meetings >= STEADY_SHARE * GLINT_PATHS)
         steady = ndimage.binary_dilation(steady, beside, mask=around)
         return without_specks(np.where(steady[..., None], again, layers), steady)
 
-    def _glare(
-        self, camera: RayCamera, everywhere: NDArray[np.bool_], paths: int, seed: int
-    ) -> NDArray[np.float32]:
-        """Return the layers of glare, by some batches of such paths."""
-        frosted = np.zeros_like(everywhere)
-        mean = np.zeros((self._groups, *everywhere.shape, 3), dtype=np.float32)
+    def _glare(self, camera: RayCamera, seed: int) -> NDArray[np.float32]:
+        """Return the layers of glare, by some batches of paths."""
+        frosted = np.zeros((camera.height, camera.width), dtype=bool)
+        mean = np.zeros((self._groups, *frosted.shape, 3), dtype=np.float32)
         square = np.zeros_like(mean)
         for number in range(GLARE_BATCHES):
-            batch, rough = self._traced(camera, everywhere, paths, seed_of(seed, 14, number), True)
+            batch, rough = self._traced(camera, seed_of(seed, 14, number), glare=True)
             mean += batch / GLARE_BATCHES
             square += batch**2 / GLARE_BATCHES
             frosted |= rough > 0
@@ -155,14 +147,18 @@ class LampImages:
     def _traced(
         self,
         camera: RayCamera,
-        pixels: NDArray[np.bool_],
-        paths: int,
         seed: int,
         glare: bool = False,
+        around: NDArray[np.bool_] | None = None,
     ) -> tuple[NDArray[np.float32], NDArray[np.floating]]:
-        """Return the lamps' layers (groups, h, w, 3) by paths through pixels, and the number (h, w)
-        of these paths: with ``glare`` those that meet a rough face, also if they meet no lamp.
+        """Return the lamps' layers (groups, h, w, 3), by `LAMP_PATHS` through all pixels or by
+        `GLINT_PATHS` through those of a mask, and the number (h, w) of paths that meet a lamp; with
+        ``glare`` of those that meet a rough face, also if they meet no lamp.
         """
+        pixels, paths = around, GLINT_PATHS
+        if pixels is None:
+            pixels = np.ones((camera.height, camera.width), dtype=bool)
+            paths = max(1, round(LAMP_PATHS * SEARCH_WIDTH / camera.width))
         pixel, number = repeated(pixels, paths)
         dr.eval(pixel, number)
         spots = film_samples(pixel, camera.width, number, seed)
