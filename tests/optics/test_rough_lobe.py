@@ -49,7 +49,7 @@ def drawn(towards: Array, eta: float, alpha: float) -> tuple[Array, Array]:
     """(n, 3) directions and (n,) weights of samples for light that comes from `towards`."""
     rng = np.random.default_rng(3)
     place = rng.random((2, SAMPLES)).astype(np.float32)
-    way, weight, _, _ = sample_rough_interface(
+    way, weight, _ = sample_rough_interface(
         mi.Vector3f(*(float(-value) for value in towards)),
         mi.Vector3f(0, 0, 1),
         mi.Float(eta),

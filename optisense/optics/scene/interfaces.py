@@ -170,7 +170,7 @@ def sample_rough_interface(
     alpha: mi.Float,
     pick: mi.Float,
     sample: mi.Point2f,
-) -> tuple[mi.Vector3f, mi.Float, mi.Bool, mi.Float]:
+) -> tuple[mi.Vector3f, mi.Float, mi.Float]:
     """Draw a direction at a rough interface.
 
     Args:
@@ -178,13 +178,12 @@ def sample_rough_interface(
         pick: random number (n,) in [0, 1) that chooses reflection or transmission.
 
     Returns:
-        The unit direction (3, n); its weight (n,); whether it is transmitted (n,); and the index on
-        its side over the index on the side that the light comes from (n,), 1 for reflection.
+        The unit direction (3, n); its weight (n,); and the index on its side over the index on the
+        side that the light comes from (n,), 1 for reflection.
     """
     reflectance, reflected, turned, transmitted, passed, eta_it = rough_lobes(
         incoming, normal, eta, alpha, sample
     )
     through = pick >= reflectance
     outgoing = dr.select(through, transmitted, reflected)
-    weight = dr.select(through, passed, turned)
-    return outgoing, weight, through, dr.select(through, eta_it, 1.0)
+    return outgoing, dr.select(through, passed, turned), dr.select(through, eta_it, 1.0)

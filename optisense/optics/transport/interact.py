@@ -182,7 +182,7 @@ def _rough(
     """
     place = ray.direction, hit.shading_normal, eta, alpha
     if ray_kind.draws:
-        outgoing, weight, _, ratio = sample_rough_interface(*place, drawn.pick, drawn.place)
+        outgoing, weight, ratio = sample_rough_interface(*place, drawn.pick, drawn.place)
         if ray_kind.carries_radiance:
             weight /= ratio * ratio
         return outgoing, mi.Color3f(weight), outgoing, mi.Float(0)
