@@ -121,6 +121,7 @@ def test_the_first_objective_decides_whether_a_trial_has_failed(
     result = search(mini, space, both, method="grid", progress=seen.append)
     assert result.best.score == seen[-1].best == 1.0
     assert seen[-1].failed == 0
+    assert {len(trial.fresh) for trial in result.trials} == {0, 1}  # the seed does not matter
     kinds = incomplete(result.trials)
     assert {kind: len(members) for kind, members in kinds.items()} == {
         "without a value of broken": 26

@@ -118,8 +118,9 @@ def _score(trials: Sequence[Trial], seeds: Sequence[int], work: Work) -> list[Tr
 
 def _alike(one: Outcome, other: Outcome) -> bool:
     """Return whether two seeds give the same scores and the same values of limited quantities."""
+    first, second = ([each.scores[name] for name in one.scores] for each in (one, other))
     same = dict(one.conditions) == dict(other.conditions)
-    return same and dict(one.scores) == dict(other.scores)
+    return same and np.array_equal(first, second, equal_nan=True)
 
 
 def _along_front(study: Study) -> list[Trial]:
