@@ -159,10 +159,10 @@ def _is_noise(best: Trial, start: Trial) -> bool:
 
 def _failures(kind: str, trials: Sequence[Trial]) -> str:
     """Return the number of trials of a kind (see `incomplete`), and the most frequent causes."""
-    from optisense.search.study.failures import causes_among
+    from optisense.search.study.failures import causes_among, counted
 
     causes = causes_among(trials)
-    lines = [f"{len(trials)} {'trial' if len(trials) == 1 else 'trials'} {kind}:"]
+    lines = [f"{counted(trials)} {kind}:"]
     lines += [f"  {len(each.numbers)}  {each.text}" for each in causes[:MOST_CAUSES]]
     if len(causes) > MOST_CAUSES:
         lines.append(f"  and {len(causes) - MOST_CAUSES} more causes")

@@ -28,7 +28,7 @@ from optisense.report.trial_pictures import count_in_words, marks_svg
 from optisense.search.methods import find
 from optisense.search.study.best import best_of, front_among, nearest, newer_note
 from optisense.search.study.conditions import condition_note, worsened_note
-from optisense.search.study.failures import incomplete, incomplete_note
+from optisense.search.study.failures import counted, incomplete, incomplete_note
 from optisense.search.study.study import Study
 from optisense.search.study.trial import Trial
 from optisense.writing import write_text
@@ -215,10 +215,10 @@ def _headline(study: Study, trials: Sequence[Trial], best: Trial | None) -> list
     facts = [("method", settings.method), ("objectives", ", ".join(settings.names))]
     count = sum(not trial.is_start for trial in trials)
     facts.append(("trials", f"{count:,} of {study.budget:,}"))
-    facts += [(kind, f"{len(members):,}") for kind, members in incomplete(trials).items()]
-    broken = sum(math.isfinite(trial.score) and not trial.is_feasible for trial in trials)
+    facts += [(kind, counted(members)) for kind, members in incomplete(trials).items()]
+    broken = [each for each in trials if math.isfinite(each.score) and not each.is_feasible]
     if broken:
-        facts.append(("break a condition", f"{broken:,}"))
+        facts.append(("break a condition", counted(broken)))
     facts += [("parameters", f"{study.space.size:,}"), ("seed", str(settings.seed))]
     spent = sum(trial.outcome.seconds for trial in trials)
     facts.append(("computing time", f"{spent:,.0f} s" if spent >= 10 else f"{spent:.2g} s"))

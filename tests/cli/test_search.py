@@ -268,12 +268,12 @@ def test_trials_without_a_further_value_have_not_failed(mine: Path, tmp_path: Pa
                  f"{mine}:near", "-b", f"{mine}:shy", "--method", "grid",
                  "--out", study)  # fmt: skip
     assert result.exit_code == 0, result.output
-    assert "3 trials without a value of shy:\n  3  shy: RuntimeError: I have" in result.output
+    assert "2 trials and the start without a value of shy:\n  3  shy: Run" in result.output
     assert "  shy failed" in result.output
     assert "trials failed" not in result.output
     with closing(Study.open(study)) as opened:
         page = render_study(opened)
-    assert '<span class="soft">without a value of shy</span> <b>3</b>' in page
+    assert '<span class="soft">without a value of shy</span> <b>2 trials and the start</b>' in page
     assert "Trials without a value of shy, by cause" in page
     assert "Trial 2 is the best by near, the first objective, but another" in page
 

@@ -7,7 +7,7 @@ are the same for the same two parts or the same rule, with any coordinates.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -88,6 +88,13 @@ def incomplete(trials: Iterable[Trial]) -> dict[str, list[Trial]]:
         elif missing:
             found.setdefault(f"without a value of {', '.join(missing)}", []).append(trial)
     return {kind: members for kind, members in found.items() if members}
+
+
+def counted(trials: Sequence[Trial]) -> str:
+    """Return the number of trials as text; the start, which is none of a budget, is told apart."""
+    number = sum(not trial.is_start for trial in trials)
+    parts = [f"{number:,} {'trial' if number == 1 else 'trials'}"] if number else []
+    return " and ".join([*parts, *["the start"] * (number < len(trials))])
 
 
 def causes_among(trials: Iterable[Trial]) -> list[FailureCause]:
