@@ -77,6 +77,24 @@ class BodyMesh:
 
 
 @dataclass(frozen=True)
+class Skin:
+    """Sensing surface.
+
+    Attributes:
+        suffix: what the names of its frame and its touch sensor end with: nothing for the only
+            skin of a sensor, else `-` and the name of the part.
+        frame: the origin is its point next to its centroid (of several, the one farthest to the
+            right in the picture), z points out of the sensor and x as near to the right of the
+            picture as it can, or to its top if z points to the right.
+        box: middle and half the sides of a box around the skin, in its frame, m.
+    """
+
+    suffix: str
+    frame: Frame
+    box: tuple[FloatArray, FloatArray]
+
+
+@dataclass(frozen=True)
 class SensorBody:
     """Sensor as a rigid body, in the frame of the design but in metres.
 
@@ -93,11 +111,7 @@ class SensorBody:
         camera_middle: place (across, down) of the camera's axis in the picture, in shares of its
             width and height.
         resolution: width and height of the picture, pixels.
-        skin: pose of the skin, which consists of all sensing surfaces: the origin is its point next
-            to its centroid (of several, the one farthest to the right in the picture), z points out
-            of the sensor and x as near to the right of the picture as it can, or to its top if z
-            points to the right.
-        skin_box: middle and half the sides of a box around the skin, in the skin's frame, m.
+        skins: the sensing surfaces, in the order of the design.
         friction: friction of the gel.
         notes: what a user must know, one sentence each.
     """
@@ -112,8 +126,7 @@ class SensorBody:
     camera_angle: float
     camera_middle: tuple[float, float]
     resolution: tuple[int, int]
-    skin: Frame
-    skin_box: tuple[FloatArray, FloatArray]
+    skins: list[Skin]
     friction: float
     notes: list[str] = field(default_factory=list)
 
@@ -141,10 +154,9 @@ def sensor_body(
             small that the inertia is none; or a density is of no solid part.
     """
     made = shapes(design)
-    skins = [each.mesh for each in made if each.role is Role.SENSING_SURFACE]
+    skins = [each for each in made if each.role is Role.SENSING_SURFACE]
     if not skins:
         raise DesignError("the design has no sensing surface", where=design.where("parts"))
-    skin = TriangleMesh.joined(skins)
     solids = [each for each in made if each.is_solid]
     given = dict(densities or {})
     _check(design, solids, mass, given)
@@ -181,12 +193,9 @@ def sensor_body(
             "kg m^2, which simulators take for 0",
             hint="Give a larger mass, or check densities (g/cm^3) and the size of parts (mm)",
         )
-    hulls = _hulls(solids, real, skin, notes)
+    hulls = _hulls(solids, real, TriangleMesh.joined([each.mesh for each in skins]), notes)
     camera = design.camera
     right, up, forward = camera.axes()
-    skin_frame = _skin_frame(skin, right, up)
-    local = METRES * skin.vertices @ skin_frame.axes - skin_frame.origin @ skin_frame.axes
-    low, high = local.min(axis=0), local.max(axis=0)
     _tell_of_camera(design, notes)
     name = file_name(design.name)
     return SensorBody(
@@ -200,8 +209,9 @@ def sensor_body(
         camera_angle=_vertical_angle(design),
         camera_middle=(0.5, 0.5) if camera.distortion is None else camera.distortion.centre,
         resolution=camera.resolution,
-        skin=skin_frame,
-        skin_box=((low + high) / 2.0, (high - low) / 2.0),
+        skins=[
+            _skin(each.mesh, f"-{each.name}" if len(skins) > 1 else "", right, up) for each in skins
+        ],
         friction=elasticity_of(design).friction,
         notes=notes,
     )
@@ -316,6 +326,14 @@ def _divided(mesh: TriangleMesh) -> TriangleMesh:
     ends = [np.column_stack([mesh.faces[:, [k, (k + 1) % 3]], middles]) for k in range(3)]
     vertices = np.concatenate([mesh.vertices, mesh.triangles.mean(axis=1)])
     return TriangleMesh(vertices, np.concatenate(ends))
+
+
+def _skin(mesh: TriangleMesh, suffix: str, right: FloatArray, up: FloatArray) -> Skin:
+    """Return a sensing surface with its frame and the box around it."""
+    frame = _skin_frame(mesh, right, up)
+    local = METRES * mesh.vertices @ frame.axes - frame.origin @ frame.axes
+    low, high = local.min(axis=0), local.max(axis=0)
+    return Skin(suffix, frame, ((low + high) / 2.0, (high - low) / 2.0))
 
 
 def _skin_frame(skin: TriangleMesh, right: FloatArray, up: FloatArray) -> Frame:

@@ -46,15 +46,18 @@ def mjcf(body: SensorBody, folder: str) -> str:
     pose = {"pos": numbers(body.camera.origin), "xyaxes": numbers((*right, *-down))}
     size = {"resolution": f"{width} {height}"}
     child(sensor, "camera", name="camera", **pose, **_view(body), **size)
-    skin, (middle, half) = body.skin, body.skin_box
-    axes = numbers((*skin.axes[:, 0], *skin.axes[:, 1]))
-    pose = {"pos": numbers(skin.origin), "xyaxes": axes}
-    child(sensor, "site", name="skin", **pose, size="0.0005", group="4")
-    pose = {"pos": numbers(skin.origin + skin.axes @ middle), "xyaxes": axes}
-    box = numbers(np.maximum(half + LEAST_HALF_SIDE, LEAST_HALF_SIDE))
-    touched = {"type": "box", **pose, "size": box, "group": "4", "rgba": "0 0 0 0"}
-    child(sensor, "site", name="touched", **touched)
-    child(child(model, "sensor"), "touch", name="normal_force", site="touched")
+    sensors = child(model, "sensor")
+    for skin in body.skins:
+        frame, (middle, half) = skin.frame, skin.box
+        axes = numbers((*frame.axes[:, 0], *frame.axes[:, 1]))
+        pose = {"pos": numbers(frame.origin), "xyaxes": axes}
+        child(sensor, "site", name=f"skin{skin.suffix}", **pose, size="0.0005", group="4")
+        pose = {"pos": numbers(frame.origin + frame.axes @ middle), "xyaxes": axes}
+        box = numbers(half + LEAST_HALF_SIDE)
+        touched = {"type": "box", **pose, "size": box, "group": "4", "rgba": "0 0 0 0"}
+        site = f"touched{skin.suffix}"
+        child(sensor, "site", name=site, **touched)
+        child(sensors, "touch", name=f"normal_force{skin.suffix}", site=site)
     return xml_text(model)
 
 

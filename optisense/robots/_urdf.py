@@ -1,4 +1,4 @@
-"""A sensor as a robot description (URDF): links for its meshes, its camera and its skin."""
+"""A sensor as a robot description (URDF): links for its meshes, its camera and its skins."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ def urdf(body: SensorBody, folder: str) -> str:
             if kind == "visual":
                 material = SubElement(shape, "material", name=each.name)
                 SubElement(material, "color", rgba=numbers(each.colour))
-    for end, frame in (("camera_optical_frame", body.camera), ("skin", body.skin)):
+    skins = [(f"skin{each.suffix}", each.frame) for each in body.skins]
+    for end, frame in (("camera_optical_frame", body.camera), *skins):
         # A link without a body, and the joint that fixes it. Roll, pitch and yaw are rotations
         # about the fixed axes x, y and z, in this order.
         name = f"{body.name}_{end}"

@@ -18,7 +18,7 @@ from optisense.errors import DesignError, OwnCodeError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.solids import as_manifold
 from optisense.robots import RobotFormat, SensorBody, export_robot, sensor_body
-from optisense.robots._body import KILOGRAMS, _skin_frame, mass_properties
+from optisense.robots._body import KILOGRAMS, Frame, _skin_frame, mass_properties
 from optisense.robots._collision import COVERED, depth_in
 from optisense.workshop.shapes import shapes
 
@@ -61,11 +61,11 @@ def made(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     return Made(design, sensor_body(design), mjcf, urdf)
 
 
-def with_ball(made: Made, above: float, slides: bool = False) -> Any:
-    """Return the model with a ball whose lowest point is so far above the middle of the skin; it
-    falls freely towards the skin, or slides along the skin's normal only.
+def with_ball(made: Made, above: float, slides: bool = False, frame: Frame | None = None) -> Any:
+    """Return the model with a ball whose lowest point is so far above the middle of the first skin,
+    or the origin of a frame; it falls freely towards it, or slides along its normal only.
     """
-    skin = made.body.skin
+    skin = made.body.skins[0].frame if frame is None else frame
     x, y, z = skin.origin + (BALL + above) * skin.axes[:, 2]
     normal = " ".join(str(value) for value in skin.axes[:, 2])
     gx, gy, gz = -GRAVITY * skin.axes[:, 2]
@@ -186,18 +186,25 @@ def test_mujoco_reads_a_sheet_of_one_triangle_and_a_design_named_world(tmp_path:
     assert model.body(1).name == mjcf.stem == "world-sensor"
 
 
-def test_all_skins_can_be_touched() -> None:
-    """The box of the touch sensor holds both, and no hull covers the second one."""
+def test_each_skin_has_a_touch_sensor_of_its_own(tmp_path: Path) -> None:
+    """Contacts on the case between skins do not count, and no hull covers the second one."""
     design = sensors.build("gelsight-mini-ideal")
     back = TriangleMesh.grid((4.0, 4.0), (2, 2))
     back = back.with_vertices(back.vertices - (0.0, 0.0, 50.0))
     design.parts |= {"back": design.parts["skin"], "case": Part(role=Role.BLOCKER, mesh="case.obj")}
     design.meshes.update({"back": back, "case": TriangleMesh.box((-9, -9, -52), (9, 9, -48))})
     body = sensor_body(design)
-    middle, half = body.skin_box
-    for name in ("skin", "back"):
-        local = (1e-3 * design.meshes[name].vertices - body.skin.origin) @ body.skin.axes
-        assert (np.abs(local - middle) <= half + 1e-9).all()
+    assert [each.suffix for each in body.skins] == ["-skin", "-back"]
+    made = Made(design, body, *export_robot(design, tmp_path, ["mujoco", "urdf"])[:2])
+    assert 'name="gelsight-mini-ideal_skin-back"' in made.urdf.read_text()
+    on_case = Frame(1e-3 * np.array([9.0, 0.0, -49.0]), np.eye(3)[:, [1, 2, 0]])
+    for frame, weight in ((None, GRAVITY * BALL_MASS), (on_case, 0.0)):
+        data = mujoco.MjData(with_ball(made, 0.0, slides=True, frame=frame))
+        for _ in range(1000):
+            mujoco.mj_step(data.model, data)
+        assert len(data.contact)
+        assert data.sensor("normal_force-skin").data[0] == pytest.approx(weight, rel=0.01)
+        assert data.sensor("normal_force-back").data[0] == 0.0
     hulls = [ConvexHull(1e3 * each.mesh.vertices) for each in body.hulls]
     assert max(depth_in(back.vertices, hull).max() for hull in hulls) < COVERED
 
@@ -314,7 +321,10 @@ def test_urdf_has_the_same_body_and_frames(made: Made) -> None:
     mujoco.mj_forward(model, data)
     name = made.body.name
     assert sum(model.body_mass) == pytest.approx(made.body.mass, rel=1e-6)
-    for end, frame in (("camera_optical_frame", made.body.camera), ("skin", made.body.skin)):
+    for end, frame in (
+        ("camera_optical_frame", made.body.camera),
+        ("skin", made.body.skins[0].frame),
+    ):
         body = data.body(f"{name}_{end}")
         np.testing.assert_allclose(body.xpos, frame.origin, atol=1e-8)
         np.testing.assert_allclose(body.xmat.reshape(3, 3), frame.axes, atol=1e-7)
