@@ -181,8 +181,8 @@ class Designs:
         try:
             design = SensorDesign.model_validate(data)
         except ValidationError as error:
-            found = design_error(error, data, where="design")
-            where = place_in(found.message, data.get("parts")) or found.where
+            found = design_error(error, data)
+            where = found.where or place_in(found.message, data.get("parts"))
             raise DesignError(found.message, where=where, hint=found.hint) from None
         base = None if folder is None else Path(folder)
         for name, part in design.parts.items():

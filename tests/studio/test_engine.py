@@ -246,7 +246,7 @@ def test_scores_rays_a_search_and_its_best_design(
     robot = tmp_path / "robot"
     assert bpy.ops.optisense.export_robot(filepath=str(robot), mass=20.0) == {"FINISHED"}
     assert {path.suffix for path in robot.iterdir()} == {".xml", ".urdf", ""}
-    assert '<mass value="0.02"/>' in next(robot.glob("*.urdf")).read_text()
+    assert '<mass value="0.02" />' in next(robot.glob("*.urdf")).read_text()
 
 
 def test_an_indenter_from_a_file_is_drawn_as_it_presses(mini: Any, tmp_path: Path) -> None:
