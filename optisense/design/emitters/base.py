@@ -30,8 +30,11 @@ DARK = 1e-6
 POLAR_ANGLES = 1025
 """Number of polar angles of a table over the beam; over 90 degrees they are 0.09 degrees apart."""
 
-ABOVE_0 = Limits("two numbers above 0", (2,), above=0.0)
-"""Limits of the width and height of a window, mm."""
+WINDOW_SIDES = Limits("a width and a height above 0 mm", (2,), above=0.0)
+"""Limits of the sides of a window, mm."""
+
+COSINE_POWER = Limits("a number that is not negative", low=0.0)
+"""Limits of the exponent of a lamp whose intensity is a power of the cosine."""
 
 AZIMUTHS = 145
 """Number of azimuths of an unsymmetric lamp's table: every 2.5 degrees, with 0 and 360."""
@@ -96,7 +99,7 @@ class Window:
     def is_valid(self) -> bool:
         """True if the shape is known and the size is positive."""
         known = self.shape in ("disc", "rectangle")
-        return known and isinstance(self.size, tuple) and ABOVE_0.allow(self.size)
+        return known and isinstance(self.size, tuple) and WINDOW_SIDES.allow(self.size)
 
 
 class LightModel(KindModel):
@@ -194,13 +197,13 @@ class LightModel(KindModel):
         if window is not None and not (isinstance(window, Window) and window.is_valid):
             raise LibraryError(
                 f"the window of an emitter of kind '{self.kind}' is {brief(repr(window))}",
-                hint="Return None, or a Window of shape 'disc' or 'rectangle', with a width and a "
-                "height above 0 mm",
+                hint="Return None, or a Window of shape 'disc' or 'rectangle', with "
+                f"{WINDOW_SIDES.words}",
             )
-        if power is not None and not Limits("a number from 0 up", low=0.0).allow(power):
+        if power is not None and not COSINE_POWER.allow(power):
             raise LibraryError(
                 f"the cosine power of an emitter of kind '{self.kind}' is {brief(repr(power))}",
-                hint="Return None, or a number that is not negative",
+                hint=f"Return None, or {COSINE_POWER.words}",
             )
         azimuth = np.linspace(0.0, 360.0, AZIMUTHS)
         polar = np.arange(0.0, 180.0 + COARSE_POLAR, COARSE_POLAR)
@@ -211,10 +214,10 @@ class LightModel(KindModel):
                 hint="Return an array in the shape of the angles",
             )
         values = np.concatenate([np.ravel(around), np.ravel(self.intensity().values)])
-        from_0 = Limits("numbers from 0 up", values.shape, low=0.0)
+        from_0 = Limits("finite and not negative", values.shape, low=0.0)
         if not from_0.allow(values) or values.max() <= 0.0:
             raise LibraryError(
-                f"the intensity of an emitter of kind '{self.kind}' must be finite and not "
-                "negative from 0 to 180 degrees, and above 0 somewhere",
+                f"the intensity of an emitter of kind '{self.kind}' must be "
+                f"{from_0.words} from 0 to 180 degrees, and above 0 somewhere",
                 hint="Change its numbers",
             )

@@ -20,7 +20,7 @@ from optisense.design.lenses.film import FilmPlaces, film_places
 from optisense.errors import DesignError
 from optisense.registry import Registry
 
-ABOVE_0 = Limits("an array (h, w, 3) of finite numbers above 0", (4, 5, 3), above=0.0)
+PICTURE_ABOVE_0 = Limits("an array (h, w, 3) of finite numbers above 0", (4, 5, 3), above=0.0)
 """Limits of transmission and gain in the small picture by which own kinds are tried."""
 
 TABLE_ROWS, TABLE_COLUMNS = 12, 16
@@ -53,9 +53,9 @@ class LensShading(KindModel):
 
     def _check_own_kind(self) -> None:
         """Check the transmission over a small picture, and its correction."""
-        found = self.transmission(film_places(*ABOVE_0.shape[:2]))
-        self._require("transmission", found, ABOVE_0)
-        self._require("correction", self.correction(found), ABOVE_0)
+        found = self.transmission(film_places(*PICTURE_ABOVE_0.shape[:2]))
+        self._require("transmission", found, PICTURE_ABOVE_0)
+        self._require("correction", self.correction(found), PICTURE_ABOVE_0)
 
     @abstractmethod
     def transmission(self, places: FilmPlaces) -> FloatingArray:
