@@ -150,7 +150,8 @@ def overlapping_boxes(
     for turn in range(2 * ROUNDS):
         if not all(map(len, rows)):
             break
-        this, (low, high), (other_low, other_high) = turn % 2, boxes[turn % 2], boxes[turn % 2 - 1]
+        this, other = turn % 2, 1 - turn % 2
+        (low, high), (other_low, other_high) = boxes[this], boxes[other]
         near = ((low <= other_high.max(axis=0)) & (high >= other_low.min(axis=0))).all(axis=1)
         if not near.all():
             rows[this], boxes[this] = rows[this][near], (low[near], high[near])
@@ -162,9 +163,9 @@ def overlapping_boxes(
     )
     along, *across = np.argsort(extent)
     tree = STRtree(box(*low_2[:, across].T, *high_2[:, across].T))
-    one, other = tree.query(box(*low_1[:, across].T, *high_1[:, across].T))
-    meet = (low_1[one, along] <= high_2[other, along]) & (high_1[one, along] >= low_2[other, along])
-    return rows[0][one[meet]], rows[1][other[meet]]
+    one, two = tree.query(box(*low_1[:, across].T, *high_1[:, across].T))
+    meet = (low_1[one, along] <= high_2[two, along]) & (high_1[one, along] >= low_2[two, along])
+    return rows[0][one[meet]], rows[1][two[meet]]
 
 
 def overlapping_pairs(low: FloatArray, high: FloatArray) -> tuple[IntArray, IntArray]:

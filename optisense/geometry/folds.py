@@ -83,7 +83,8 @@ def find_fold(
         turned = stretch <= 0.0
         # A rotation in space also changes the direction that a sheet faces, but keeps the
         # determinants positive; those of a mirror image are negative.
-        if turned.any() if mesh.is_closed else (stretch < 0.0).all():
+        inside_out = turned.any() if mesh.is_closed else (stretch < 0.0).all()
+        if inside_out:
             vertex = int(np.argmin(stretch))
             return Fold("inside out", bent.vertices[vertex], vertex, int(turned.sum()))
         if in_view:
