@@ -1,5 +1,5 @@
-"""Entries of the library in files: their reader, whose errors name file and line, and the user's
-own.
+"""The reader of the library's entries in files, whose errors name file and line, and the folder of
+the user's own entries.
 
 The user's own parts are in a folder with a file for each entry, and are read together with the
 built-in ones. `materials/NAME.yaml`, `coatings/`, `lights/` (with their .ies files) and `cameras/`
