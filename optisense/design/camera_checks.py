@@ -29,8 +29,9 @@ assumed, as its data sheet was not at hand). Goerz's Hypergon of 1900 has 130 (H
 "Distagon, Biogon and Hologon", Carl Zeiss 2011)."""
 
 WIDEST_FISHEYE = 280.0
-"""Angle across the image of the widest fisheye, degrees: that of Entaniya's M12 280, a lens for
-small cameras, by its name (assumed, as its data sheet was not at hand)."""
+"""Angle across the image of the widest fisheye, degrees. C-4 Optics' 4.9 mm f/3.5 has 270
+(Lensrentals, "Assembling the C-4 Optics 4.9mm f3.5 Hyperfisheye Prototype", 2019). Entaniya's M12
+280, a lens for small cameras, has 280 by its name (assumed, as its data sheet was not at hand)."""
 
 ROUNDED = 1e-9
 """Rounding error of an angle, degrees, by which it may exceed its limit."""

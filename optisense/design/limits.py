@@ -34,8 +34,9 @@ media are simulated as clear."""
 
 MOST_OF_A_SOLID = 2.15
 """Largest refractive index of a clear glass on sale, Sumita's K-PSFn214P, whose name gives 2.14
-(its data sheet was not at hand). Crystals such as diamond, 2.42, have more, but nobody makes a
-sensor of them."""
+(its data sheet was not at hand; K-PSFn2 has 1.997 in the maker's catalogue of 2017 by
+refractiveindex.info). Crystals such as diamond, 2.42, have more, but nobody makes a sensor of
+them."""
 
 MOST_OF_AN_ELASTOMER = 1.65
 """Largest refractive index of a clear elastomer. Silicones for lamps reach 1.62 at 633 nm: Mosley
