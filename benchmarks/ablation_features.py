@@ -173,7 +173,7 @@ def _of_shading() -> list[Ablation]:
         _shading("lobes broadened by angular variance",
                  Change(bin_sums, "broadened_coating", _first),
                  Change(beam_sums, "broadened_coating", _first)),
-        _shading("two discs of narrow lobes", Change(bin_sums, "two_discs", one_disc)),
+        _shading("two discs of narrow lobes", Change(angular_variance, "two_discs", one_disc)),
     ]  # fmt: skip
 
 
