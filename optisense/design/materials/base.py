@@ -79,8 +79,8 @@ class Reflection:
 
     def in_medium(self, ior: float) -> Reflection:
         """Return the same surface in a medium with this index, by which the metal's is divided."""
-        eta, k = ([value / ior for value in index] for index in (self.eta, self.k))
-        return replace(self, eta=eta, k=k)  # type: ignore[arg-type]  # made tuples
+        eta, k = ((r / ior, g / ior, b / ior) for r, g, b in (self.eta, self.k))
+        return replace(self, eta=eta, k=k)
 
     def normal_reflectance(self) -> NDArray[np.float64]:
         """Return the reflectance at normal incidence at R, G, B, (3,)."""
