@@ -401,13 +401,10 @@ class OpticalModel(RayModel):
             radius=FIRST_RADIUS * fineness(self.scenes.opaque),
             stop=stop,
         )
-        difference = result.halves[0] - result.halves[1]
-        mean = float(result.layers.mean())
-        reached = float(np.sqrt((difference**2).mean()) / 2 / mean) if mean > 0 else 0.0
         return ImageLayers(
             radiance=result.layers,
             photons=result.photons,
-            noise=reached if result.passes > 1 else float("inf"),
+            noise=result.noise,
             worst_noise=None,
             samples=[result.passes, result.passes],
             interrupted=False,

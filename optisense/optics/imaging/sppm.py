@@ -13,6 +13,7 @@ The kernel is Epanechnikov's, over a disc of radius r.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -191,6 +192,17 @@ class SppmResult:
     halves: NDArray[np.float32]
     passes: int
     photons: int
+
+    @property
+    def noise(self) -> float:
+        """Relative RMS noise of the layers, from the difference of their halves; infinite after a
+        single pass.
+        """
+        if self.passes < 2:
+            return math.inf
+        mean = float(self.layers.mean())
+        difference = self.halves[0] - self.halves[1]
+        return float(np.sqrt((difference**2).mean()) / 2 / mean) if mean > 0 else 0.0
 
 
 def render_sppm(
