@@ -1,6 +1,4 @@
-"""The windows of lights in the scene, their places off faces, and the media in front of them and on
-both sides of opaque sheets.
-"""
+"""The windows of lights in the scene, their places off faces, and the media in front of them."""
 
 from __future__ import annotations
 
@@ -13,9 +11,7 @@ from numpy.typing import NDArray
 
 from optisense.array_types import FloatingArray
 from optisense.design.lights import frame_of
-from optisense.geometry import TriangleMesh
-from optisense.geometry.containment import inside
-from optisense.optics.scene._solids import AROUND, Solid
+from optisense.optics.scene._solids import AROUND, PROBE, Solid, solid_at
 from optisense.optics.scene.emitters import (
     DISC_CORNERS,
     DISC_REACH,
@@ -27,9 +23,6 @@ from optisense.optics.scene.emitters import (
 from optisense.optics.scene.ray_scene import Piece
 from optisense.optics.scene.surfaces import CLEAR, RAY_OFFSET, Surface, SurfaceKind
 
-PROBE = 0.02
-"""Distance (mm) off a sheet or a light at which the medium beside it is looked up: ten times the
-distance below which faces touch, and no more than the thinnest film that a design holds."""
 OFF_FACE = 3 * RAY_OFFSET
 """Distance (mm) by which the window of a light on a face is shifted: beyond any face that is up to
 two `RAY_OFFSET` in front of it, by at least one, so that rays that leave the face meet it."""
@@ -43,62 +36,6 @@ ASIDE = np.array([0.004, 0.003])
 looked up off the place itself if that is in no solid: it may lie in the gap between the faces of
 two that touch. Each is longer than the 0.002 mm below which faces touch, and they differ, as such a
 face may also run along a diagonal of the light."""
-
-
-def solid_at(points: FloatingArray, solids: Sequence[Solid]) -> NDArray[np.int64]:
-    """Return the number (n,) of the solid at each point (n, 3), mm; -1 for air."""
-    found = np.full(len(points), -1)
-    rank = np.full(len(points), -np.inf)
-    for number, solid in enumerate(solids):
-        here = inside(points, solid.mesh) & (solid.priority > rank)
-        found[here], rank[here] = number, solid.priority
-    return found
-
-
-def media_beside(sheet: Piece, solids: Sequence[Solid], each: bool) -> NDArray[np.int64]:
-    """Return the numbers (m, 2) of the solids in front of and behind each face of an opaque sheet;
-    -1 for air.
-
-    Args:
-        each: whether they are looked up beside the middle of the largest face of each flat or
-            smooth patch; else beside that of the largest face of all.
-    """
-    corners = sheet.vertices[sheet.faces]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    size = np.linalg.norm(cross, axis=1)
-    normals = cross / np.where(size > 0, size, 1.0)[:, None]
-    patch = np.zeros(len(corners), dtype=np.int64)
-    if each and sheet.normals is None:  # parallel flat faces may lie at several levels
-        level = np.round(np.einsum("fi,fi->f", normals, corners[:, 0]) / PROBE).astype(np.int64)
-        levels = np.stack([sheet.patches, level], axis=1)
-        patch = np.unique(levels, axis=0, return_inverse=True)[1].reshape(-1)
-    elif each:
-        patch = sheet.patches
-    falling = np.argsort(-size, kind="stable")
-    largest = falling[np.unique(patch[falling], return_index=True)[1]]
-    middle, off = corners[largest].mean(axis=1), PROBE * normals[largest]
-    sides = [solid_at(middle + off, solids), solid_at(middle - off, solids)]
-    return np.stack(sides, axis=1)[patch]
-
-
-def split_by_media(
-    mesh: TriangleMesh, beside: NDArray[np.int64]
-) -> list[tuple[tuple[int, int], TriangleMesh]]:
-    """Return the parts of a sheet that lie between two media each, with the numbers of these.
-
-    Args:
-        beside: numbers (m, 2) of the media, as of `media_beside`.
-    """
-    if (beside == beside[0]).all():
-        return [((int(beside[0, 0]), int(beside[0, 1])), mesh)]
-    pairs, kind = np.unique(beside, axis=0, return_inverse=True)
-    return [
-        (
-            (int(front), int(back)),
-            mesh.with_faces(mesh.faces[kind.reshape(-1) == number]).compacted(),
-        )
-        for number, (front, back) in enumerate(pairs)
-    ]
 
 
 def with_media(emitters: Sequence[Emitter], solids: Sequence[Solid]) -> list[Emitter]:

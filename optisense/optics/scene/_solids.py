@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from optisense.array_types import FloatingArray
+from optisense.geometry.containment import inside
 from optisense.geometry.mesh import TriangleMesh
 from optisense.optics.scene.surfaces import CLEAR, RGB
 
 AIR = "air"
 """Name of the medium around all solids."""
+
+PROBE = 0.02
+"""Distance (mm) off a sheet or a light at which the medium beside it is looked up: ten times the
+distance below which faces touch, and no more than the thinnest film that a design holds."""
 
 
 @dataclass(frozen=True)
@@ -85,3 +93,13 @@ class Interface:
     names: tuple[str, ...]
     etas: RGB | None = None
     absorption: tuple[RGB, RGB] = (CLEAR, CLEAR)
+
+
+def solid_at(points: FloatingArray, solids: Sequence[Solid]) -> NDArray[np.int64]:
+    """Return the number (n,) of the solid at each point (n, 3), mm; -1 for air."""
+    found = np.full(len(points), -1)
+    rank = np.full(len(points), -np.inf)
+    for number, solid in enumerate(solids):
+        here = inside(points, solid.mesh) & (solid.priority > rank)
+        found[here], rank[here] = number, solid.priority
+    return found

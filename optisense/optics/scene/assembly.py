@@ -17,13 +17,8 @@ from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.coplanar import merge_coplanar
 from optisense.optics.scene._finishes import ShapeCache, finishes_of, frosted
-from optisense.optics.scene._lamp_places import (
-    media_beside,
-    off_faces,
-    split_by_media,
-    window,
-    with_media,
-)
+from optisense.optics.scene._lamp_places import off_faces, window, with_media
+from optisense.optics.scene._sheets import media_beside, split_by_media
 from optisense.optics.scene._solids import AROUND, Interface, Sheet, Solid
 from optisense.optics.scene.emitters import Emitter, EmitterShape
 from optisense.optics.scene.media import Media, same_faces
