@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from xml.etree.ElementTree import Element, SubElement
+from xml.etree.ElementTree import Element
 
 from scipy.spatial.transform import Rotation
 
 from optisense.robots._body import SensorBody
-from optisense.robots._mjcf import numbers, xml_text
+from optisense.robots._mjcf import child, numbers, xml_text
 
 
 def urdf(body: SensorBody, folder: str) -> str:
@@ -17,32 +17,32 @@ def urdf(body: SensorBody, folder: str) -> str:
     down, z where the camera looks.
     """
     robot = Element("robot", name=body.name)
-    link = SubElement(robot, "link", name=body.name)
-    inertial = SubElement(link, "inertial")
-    SubElement(inertial, "origin", xyz=numbers(body.centre), rpy="0 0 0")
-    SubElement(inertial, "mass", value=f"{body.mass:.9g}")
+    link = child(robot, "link", name=body.name)
+    inertial = child(link, "inertial")
+    child(inertial, "origin", xyz=numbers(body.centre), rpy="0 0 0")
+    child(inertial, "mass", value=f"{body.mass:.9g}")
     places = {f"i{'xyz'[i]}{'xyz'[j]}": (i, j) for i in range(3) for j in range(i, 3)}
     inertia = {name: f"{body.inertia[place]:.9g}" for name, place in places.items()}
-    SubElement(inertial, "inertia", inertia)
+    child(inertial, "inertia", **inertia)
     for kind, meshes in (("visual", body.looks), ("collision", body.hulls)):
         for each in meshes:
-            shape = SubElement(link, kind, name=each.name)
-            geometry = SubElement(shape, "geometry")
-            SubElement(geometry, "mesh", filename=f"{folder}/{each.name}.stl")
+            shape = child(link, kind, name=each.name)
+            geometry = child(shape, "geometry")
+            child(geometry, "mesh", filename=f"{folder}/{each.name}.stl")
             if kind == "visual":
-                material = SubElement(shape, "material", name=each.name)
-                SubElement(material, "color", rgba=numbers(each.colour))
+                material = child(shape, "material", name=each.name)
+                child(material, "color", rgba=numbers(each.colour))
     skins = [(f"skin{each.suffix}", each.frame) for each in body.skins]
     for end, frame in (("camera_optical_frame", body.camera), *skins):
         # A link without a body, and the joint that fixes it. Roll, pitch and yaw are rotations
         # about the fixed axes x, y and z, in this order.
         name = f"{body.name}_{end}"
-        SubElement(robot, "link", name=name)
-        joint = SubElement(robot, "joint", name=f"{name}_joint", type="fixed")
-        SubElement(joint, "parent", link=body.name)
-        SubElement(joint, "child", link=name)
+        child(robot, "link", name=name)
+        joint = child(robot, "joint", name=f"{name}_joint", type="fixed")
+        child(joint, "parent", link=body.name)
+        child(joint, "child", link=name)
         angles = Rotation.from_matrix(frame.axes).as_euler("xyz")
-        SubElement(joint, "origin", xyz=numbers(frame.origin), rpy=numbers(angles))
+        child(joint, "origin", xyz=numbers(frame.origin), rpy=numbers(angles))
     return '<?xml version="1.0"?>\n' + xml_text(robot)
 
 
