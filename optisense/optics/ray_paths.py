@@ -44,6 +44,9 @@ def trace_paths(
 ) -> RayPaths:
     """Trace the path of the ray through the middle of each pixel, row by row.
 
+    The rays are traced once more for their outcomes, as chief rays are, which takes some
+    milliseconds for the few hundred rays of a drawing.
+
     Args:
         resolution: (width, height) of the grid of pixels.
 
