@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import csv
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -63,18 +64,20 @@ class BoardPart:
     bottom: bool
 
 
-def read_pick_and_place(
-    path: Path, units: Units | None = None
-) -> tuple[dict[str, BoardPart], list[str]]:
-    """Return the parts of a pick-and-place file, by designator, and notes on columns that it lacks.
+PartTable = Mapping[str, BoardPart | DesignError]
+"""Parts by designator. If the position of a part is unknown, because its line has no numbers or an
+unknown side, or repeats a designator, there is the error instead, which names the line."""
+
+
+def read_pick_and_place(path: Path, units: Units | None = None) -> tuple[PartTable, list[str]]:
+    """Return the parts of a pick-and-place file and notes on columns that it lacks.
 
     It is a table with commas, semicolons, tabs or blanks, as UTF-8 or UTF-16. Units are those of
     its lengths if it does not state them.
 
     Raises:
-        DesignError: the file is missing, lacks the columns or its unit, or has positions in space;
-            or a line has no numbers or an unknown side, or repeats a designator. The message names
-            the line.
+        DesignError: the file is missing, lacks the columns or has no parts; or it has positions in
+            space.
     """
     lines = _lines(path)
     for number, line in enumerate(lines):
@@ -82,10 +85,10 @@ def read_pick_and_place(
             head = _cells(line.lstrip("#"), delimiter)
             columns = {key: _column(head, key) for key in NAMES}
             if all(columns[key] is not None for key in NEEDED):
-                _refuse_space(path, number + 1, head)
                 rows = [(n, _cells(text, delimiter))
                         for n, text in enumerate(lines[number + 1 :], start=number + 2)
                         if text.strip() and not text.lstrip().startswith("#")]  # fmt: skip
+                _refuse_space(path, head, rows)
                 unit = _unit(head, columns, lines[: number + 1]) or units
                 return _placed(path, rows, columns, unit), _without(path, columns)
     raise DesignError(
@@ -121,27 +124,35 @@ def _cells(line: str, delimiter: str | None) -> list[str]:
     return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), [])]
 
 
+def _cell(cells: list[str], column: int | None) -> str:
+    """Return the cell in a column, or nothing if the row lacks it."""
+    return "" if column is None or column >= len(cells) else cells[column]
+
+
 def _column(head: list[str], key: str) -> int | None:
     extra = r"\(.*?\)|\[.*?\]|_?(?:mm|mil|deg|degrees)$|[^a-z]"
     plain = [re.sub(extra, "", cell.lower().strip()) for cell in head]
     return next((plain.index(name) for name in NAMES[key] if name in plain), None)
 
 
-def _refuse_space(path: Path, number: int, head: list[str]) -> None:
-    """Check that the head has no z.
+def _refuse_space(path: Path, head: list[str], rows: list[tuple[int, list[str]]]) -> None:
+    """Check that z, if there is such a column, is 0 in all rows.
 
     Raises:
-        DesignError: it has one.
+        DesignError: it is not.
     """
     column = _column(head, "z")
-    if column is not None:
-        raise DesignError(
-            f"the column '{brief(head[column])}' says that these are positions in space, and "
-            "positions on a board are needed",
-            where=f"{path}:{number}",
-            hint="Give the table of one board, such as board-1.pos of 'optisense export', or "
-            "remove the column if it is 0 throughout",
-        )
+    if column is None:
+        return
+    for number, cells in rows:
+        match = _NUMBER.match(_cell(cells, column))
+        if match is not None and float(match[1]) != 0.0:
+            raise DesignError(
+                f"the column '{brief(head[column])}' says that these are positions in space, and "
+                "positions on a board are needed",
+                where=f"{path}:{number}",
+                hint="Give the table of one board, such as board-1.pos of 'optisense export'",
+            )
 
 
 def _unit(head: list[str], columns: dict[str, int | None], before: list[str]) -> str | None:
@@ -168,38 +179,42 @@ def _without(path: Path, columns: dict[str, int | None]) -> list[str]:
 
 def _placed(
     path: Path, rows: list[tuple[int, list[str]]], columns: dict[str, int | None], unit: str | None
-) -> dict[str, BoardPart]:
-    parts: dict[str, BoardPart] = {}
+) -> PartTable:
+    parts: dict[str, BoardPart | DesignError] = {}
     lines: dict[str, int] = {}
-    for number, cells in rows:
-
-        def cell(key: str, cells: list[str] = cells) -> str:
-            column = columns[key]
-            return "" if column is None or column >= len(cells) else cells[column]
-
-        name = cell("designator")
+    for number, row in rows:
+        cells = {key: _cell(row, column) for key, column in columns.items()}
+        name = cells["designator"]
         if not name:
             continue
-        if name in parts:
-            raise DesignError(
+        try:
+            parts[name] = _part(cells, unit, path, number)
+        except DesignError as error:
+            parts[name] = error
+        if name in lines:
+            parts[name] = DesignError(
                 f"'{brief(name)}' is also in line {lines[name]}",
                 where=f"{path}:{number}",
                 hint="Remove one of the two lines",
             )
         lines[name] = number
-        x, y = (_length(cell(key), unit, path, number) for key in ("x", "y"))
-        rotation = _rotation(cell("rotation"), path, number)
-        if not all(abs(value) <= LARGEST for value in (x, y, rotation)):
-            raise DesignError(
-                f"the position or rotation of '{brief(name)}' is too large a number: at most "
-                f"{LARGEST:,.0f} mm or degrees are read",
-                where=f"{path}:{number}",
-                hint="Export the file again",
-            )
-        parts[name] = BoardPart(name, x, y, rotation, _bottom(cell("side"), path, number))
     if not parts:
         raise DesignError("the pick-and-place file has no parts", where=str(path))
     return parts
+
+
+def _part(cells: dict[str, str], unit: str | None, path: Path, number: int) -> BoardPart:
+    name = cells["designator"]
+    x, y = (_length(cells[key], unit, path, number) for key in ("x", "y"))
+    rotation = _rotation(cells["rotation"], path, number)
+    if not all(abs(value) <= LARGEST for value in (x, y, rotation)):
+        raise DesignError(
+            f"the position or rotation of '{brief(name)}' is too large a number: at most "
+            f"{LARGEST:,.0f} mm or degrees are read",
+            where=f"{path}:{number}",
+            hint="Export the file again",
+        )
+    return BoardPart(name, x, y, rotation, _bottom(cells["side"], path, number))
 
 
 def _rotation(text: str, path: Path, number: int) -> float:

@@ -14,7 +14,7 @@ from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.near import suggestion
 from optisense.sensors.from_meshes._lights import evenly, light
-from optisense.sensors.from_meshes._pick_and_place import BoardPart
+from optisense.sensors.from_meshes._pick_and_place import BoardPart, PartTable
 from optisense.sensors.from_meshes.directions import axis_of, radial_vector, vector
 from optisense.sensors.from_meshes.recipe_lights import FromTable, LightsAlong
 
@@ -103,22 +103,23 @@ def _round(one: FloatArray, other: FloatArray) -> bool:
     return bool(one @ other > np.cos(np.radians(ROUND)))
 
 
-def from_table(choice: FromTable, table: dict[str, BoardPart]) -> list[Light]:
+def from_table(choice: FromTable, table: PartTable) -> list[Light]:
     """Return the lights of a pick-and-place file at the position of its board in the sensor.
 
     Raises:
-        DesignError: there is no such designator, or the points do not fit the file.
+        DesignError: there is no such designator, the position of a chosen part is unknown, or the
+            points do not fit the file.
     """
     wanted = [choice.only] if isinstance(choice.only, str) else choice.only
-    chosen: list[BoardPart] = list(table.values())
+    chosen = list(table)
     if wanted is not None:
         for name in wanted:
             if not fnmatch.filter(table, name):
                 raise _unknown(name, table)
-        chosen = [p for n, p in table.items() if any(fnmatch.fnmatchcase(n, w) for w in wanted)]
+        chosen = [name for name in table if any(fnmatch.fnmatchcase(name, w) for w in wanted)]
     frame, origin = _frame(choice, table)
     lights = []
-    for part in chosen:
+    for part in (_known(name, table) for name in chosen):
         side = -1.0 if part.bottom else 1.0
         turn = np.radians(part.rotation)
         up = -np.sin(turn) * frame[0] + np.cos(turn) * frame[1]
@@ -128,7 +129,7 @@ def from_table(choice: FromTable, table: dict[str, BoardPart]) -> list[Light]:
     return lights
 
 
-def _frame(choice: FromTable, table: dict[str, BoardPart]) -> tuple[FloatArray, FloatArray]:
+def _frame(choice: FromTable, table: PartTable) -> tuple[FloatArray, FloatArray]:
     """Return the board's x, y and top as rows (3, 3), and the position of its origin (3,), mm."""
     if choice.points is None:
         normal = vector(choice.normal or "+z")
@@ -141,11 +142,9 @@ def _frame(choice: FromTable, table: dict[str, BoardPart]) -> tuple[FloatArray, 
             )
         right /= np.linalg.norm(right)
         return np.array([right, np.cross(normal, right), normal]), np.array(choice.origin)
-    for name in choice.points:
-        if name not in table:
-            raise _unknown(name, table)
     names = list(choice.points)
-    board = np.array([(table[name].x, table[name].y, 0.0) for name in names])
+    parts = [_known(name, table) for name in names]
+    board = np.array([(part.x, part.y, 0.0) for part in parts])
     there = np.array([choice.points[name] for name in names])
     for i, one in enumerate(names):
         for j in range(i):
@@ -189,7 +188,17 @@ def _fitted(
     return frame, there.mean(axis=0) - board.mean(axis=0) @ frame
 
 
-def _unknown(name: str, table: dict[str, BoardPart]) -> DesignError:
+def _known(name: str, table: PartTable) -> BoardPart:
+    """Return a part; DesignError if there is none of this name, or its position is unknown."""
+    if name not in table:
+        raise _unknown(name, table)
+    part = table[name]
+    if isinstance(part, DesignError):
+        raise part
+    return part
+
+
+def _unknown(name: str, table: PartTable) -> DesignError:
     return DesignError(
         f"the file has no part '{name}'", hint=suggestion(name, list(table), limit=12)
     )

@@ -220,10 +220,12 @@ def test_pick_and_place_files_of_all_programs(
     found, notes = read_pick_and_place(file, units)
     assert notes == []
     assert list(found) == ["D1", "D2"]
-    assert found["D1"].x == pytest.approx(25.4)
-    assert found["D1"].y == pytest.approx(-12.7)
-    assert (found["D1"].rotation, found["D1"].bottom) == (90.0, False)
-    assert (found["D2"].rotation, found["D2"].bottom) == (180.0, True)
+    first, second = found["D1"], found["D2"]
+    assert isinstance(first, BoardPart) and isinstance(second, BoardPart)
+    assert first.x == pytest.approx(25.4)
+    assert first.y == pytest.approx(-12.7)
+    assert (first.rotation, first.bottom) == (90.0, False)
+    assert (second.rotation, second.bottom) == (180.0, True)
 
 
 @pytest.mark.parametrize(
@@ -245,7 +247,23 @@ def test_files_that_cannot_be_read(tmp_path: Path, text: str, words: str) -> Non
     file = tmp_path / "leds.csv"
     file.write_text(text)
     with pytest.raises(DesignError, match=words):
-        read_pick_and_place(file)
+        from_table(FromTable(file=file.name, origin=(0.0, 0.0, 0.0)), read_pick_and_place(file)[0])
+
+
+def test_rows_that_are_not_chosen_may_be_faulty(tmp_path: Path) -> None:
+    """KiCad calls all holes REF**, and other programs give parts without a side or an angle."""
+    file = tmp_path / "leds.csv"
+    file.write_text(
+        "Ref,X_mm,Y_mm,Z_mm,Rot,Side\nREF**,1,1,,0,top\nREF**,9,1,0,0,top\n"
+        "X1,5,5,0,N/A,top\nX2,6,6,0,0,MultiLayer\nD1,2,3,0.0,90,top\n"
+    )
+    found = read_pick_and_place(file)[0]
+    choice = FromTable(file=file.name, only="D*", origin=(0.0, 0.0, 0.0), gap=0.0)
+    (led,) = from_table(choice, found)
+    assert led.position == (2.0, 3.0, 0.0)
+    for only, words in (("REF**", "also in line 2"), ("X1", "'N/A' is no"), ("X2", "no side")):
+        with pytest.raises(DesignError, match=words):
+            from_table(choice.model_copy(update={"only": only}), found)
 
 
 def test_columns_that_a_table_lacks_are_noted(tmp_path: Path) -> None:
