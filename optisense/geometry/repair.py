@@ -117,8 +117,8 @@ def narrow_openings(mesh: TriangleMesh) -> str | None:
 def outward(mesh: TriangleMesh) -> TriangleMesh:
     """Return a closed mesh, whose faces agree with their neighbours, with bodies that look outward.
 
-    A shell inside another one is a cavity if it is drawn contrary to the outermost shell around it,
-    and a body if it is drawn alike. Bodies may overlap.
+    A shell inside a body is a cavity if it is drawn contrary to the outermost shell around it, and
+    a body if it is drawn alike. Bodies may overlap.
     """
     labels = shells(mesh)
     cones = np.einsum("ij,ij->i", mesh.triangles[:, 0], mesh.face_vectors) / 6.0
@@ -128,7 +128,8 @@ def outward(mesh: TriangleMesh) -> TriangleMesh:
     if not inward.all():
         within = _within(_shapes_of(mesh, labels), None)
         outermost = within & ~within.any(axis=1)
-        inward = np.where(outermost.any(axis=1), inward[outermost.argmax(axis=1)], inward)
+        contrary = outermost.any(axis=1) & (inward != inward[outermost.argmax(axis=1)])
+        inward = inward != _cavities(within, contrary)
     over = inward[labels]
     return mesh.with_faces(np.where(over[:, None], mesh.faces[:, ::-1], mesh.faces))
 
@@ -298,16 +299,16 @@ def _outward(mesh: TriangleMesh, where: str, notes: list[str]) -> TriangleMesh:
                 hint="In the CAD tool: export a solid body, not a flat one",
             )
     within = _within(bodies, where)
-    depths = within.sum(axis=1)
-    for label, (body, depth) in enumerate(zip(bodies, depths, strict=True)):
-        if (body.volume > 0.0) != (depth % 2 == 0):
+    cavities = _cavities(within)
+    for label, body in enumerate(bodies):
+        if (body.volume > 0.0) == cavities[label]:
             faces[labels == label] = faces[labels == label][:, ::-1]
     turned = (faces != mesh.faces).any(axis=1)
     # A shell was drawn inside out if most of its area had to be turned.
     area = np.bincount(labels, mesh.face_areas)
     over = 2.0 * np.bincount(labels, mesh.face_areas * turned) > area
-    for label in [] if turned.all() else np.flatnonzero(depths % 2 == 1).tolist():
-        outermost = np.flatnonzero(within[label] & (depths == 0))[0]
+    for label in [] if turned.all() else np.flatnonzero(cavities).tolist():
+        outermost = np.flatnonzero(within[label] & ~within.any(axis=1))[0]
         if over[label] != over[outermost]:
             turned[labels == label] = False
             notes.append(
@@ -317,6 +318,20 @@ def _outward(mesh: TriangleMesh, where: str, notes: list[str]) -> TriangleMesh:
             )
     _tell_of_turned(turned, notes)
     return mesh.with_faces(faces)
+
+
+def _cavities(within: BoolArray, contrary: BoolArray | None = None) -> BoolArray:
+    """Return a mask (n,) of the shells that are cavities: those inside a body, or only the contrary
+    (n,) ones of these. A shell in empty space is a body.
+
+    Args:
+        within: mask (n, n) of the shells (rows) that lie inside others (columns).
+    """
+    cavities = np.zeros(len(within), dtype=bool)
+    for shell in np.argsort(within.sum(axis=1), kind="stable"):  # from outside to inside
+        bodies = within[shell] @ np.where(cavities, -1, 1)
+        cavities[shell] = bodies > 0 and (contrary is None or contrary[shell])
+    return cavities
 
 
 def _tell_of_turned(turned: BoolArray, notes: list[str]) -> None:

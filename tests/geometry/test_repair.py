@@ -88,6 +88,15 @@ def test_bodies_of_an_opaque_part_look_outward_and_its_cavities_inward() -> None
             assert len(notes) == 1 and "faces were inside out; they were turned over" in notes[0]
 
 
+@pytest.mark.parametrize("closed", [True, False])
+def test_a_shell_in_a_cavity_is_a_body_however_it_was_drawn(closed: bool) -> None:
+    hollow = TriangleMesh.box((2, 2, 1), (4, 4, 3)).flipped()
+    loose = TriangleMesh.box((2.5, 2.5, 1.5), (3.5, 3.5, 2.5))
+    for drawn in (loose, loose.flipped()):
+        mesh, _ = repaired(TriangleMesh.joined([BLOCK, hollow, drawn]), "gel", closed)
+        assert mesh.volume == pytest.approx(VOLUME - 8.0 + 1.0)
+
+
 @pytest.mark.parametrize("at", [(10, 2, 1), (10, 8, 3), (10, 8, 4), (2, 2, 4 - 5e-5)])
 def test_bodies_may_touch_with_faces_edges_and_corners(at: tuple[float, float, float]) -> None:
     beside = TriangleMesh.box(at, np.add(at, (1, 1, 2))).flipped()
