@@ -26,7 +26,9 @@ FIRST, BEST = 0.236, 0.635
 """AOAP (0 to 1) of the first and of the best mirror in the OptiSense paper."""
 
 NEAR = 0.05
-"""Difference of two AOAP values (0 to 1) below which they count as alike."""
+"""Difference of two AOAP values (0 to 1) up to which the first mirror counts as the paper's, and
+amount by which the best one may be below the paper's; a better one agrees with the statement.
+"""
 
 LESS = 0.8
 """Ratio, after to before, of the excess stretch of circles (length over width, minus 1) up to which
@@ -171,24 +173,46 @@ def _numbers(
 def claims(numbers: Values) -> list[Claim]:
     """Return the paper's statements on the mirror, with verdicts."""
     mirrors = numbers["mirrors"]
-    first, best = mirrors["first"]["aoap"], mirrors["cma-es"]["aoap"]
-    gradient = mirrors["gradient"]["aoap"]
-    before, after = (mirrors[name]["stretch"] for name in ("first", "cma-es"))
+    found, gradient = mirrors["cma-es"], mirrors["gradient"]["aoap"]
+    return statements(
+        mirrors["first"],
+        found,
+        f"CMA-ES raises AOAP to {BEST:g}.",
+        f"{shown(found['aoap'])} after {_trials(numbers, 'cma-es')} trials; "
+        f"{shown(gradient)} by gradient after {_trials(numbers, 'gradient')}",
+    )
+
+
+def statements(
+    first: dict[str, Spread], best: dict[str, Spread], raises: str, here: str
+) -> list[Claim]:
+    """Return the paper's statements on the first mirror and on the best one of a search.
+
+    Args:
+        first: AOAP (0 to 1) and stretch of circles (1 or more) of the first mirror.
+        best: the same of the mirror that the search found.
+        raises: the statement that the search raises AOAP.
+        here: the result of the search, with numbers.
+    """
+    start, found = first["aoap"]["mean"], best["aoap"]["mean"]
+    before, after = first["stretch"], best["stretch"]
     return [
         Claim(
             f"AOAP of the first mirror is {FIRST:g}.",
-            shown(first),
-            _near(first, FIRST),
+            shown(first["aoap"]),
+            None if start is None else abs(start - FIRST) <= NEAR,
             "The shape was measured in an animation, whose scale is assumed, and the number of "
             "rays that arrive depends on the field of view of the camera.",
         ),
         Claim(
-            f"CMA-ES raises AOAP to {BEST:g}.",
-            f"{shown(best)} after {_trials(numbers, 'cma-es')} trials; "
-            f"{shown(gradient)} by gradient after {_trials(numbers, 'gradient')}",
-            _near(best, BEST),
-            "The paper gives neither the number of trials nor the population size. A search that "
-            "stops earlier reaches a lower score. The coverage, which hardly counts, also differs.",
+            raises,
+            here,
+            None if found is None else found >= BEST - NEAR,
+            "The bounds of the search are a cause: each coordinate of the cage lies between its "
+            "values in the flat mirror and in the most curved one. If its points may move by 8 mm "
+            "towards the skin and back, by 1 mm across and by 2 mm along the finger, CMA-ES "
+            "exceeds the paper's value ([benchmark](../benchmarks/search.md)). The paper gives "
+            "neither bounds in mm, nor the number of trials, nor the population size.",
         ),
         Claim(
             "With the optimised mirror, objects look hardly distorted.",
@@ -204,10 +228,6 @@ def claims(numbers: Values) -> list[Claim]:
             "simplified surface.",
         ),
     ]
-
-
-def _near(found: Spread, value: float) -> bool | None:
-    return None if found["mean"] is None else abs(found["mean"] - value) <= NEAR
 
 
 def _trials(numbers: Values, method: str) -> int:

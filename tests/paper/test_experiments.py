@@ -180,6 +180,8 @@ def test_svelte_is_held_against_the_papers_two_numbers(answered: Answered) -> No
     assert found == ["agrees", "agrees", "agrees"]
     found = list(verdicts("svelte-mirror", lambda *_: 0.4, answered).values())
     assert found[:2] == ["disagrees", "disagrees"]
+    found = list(verdicts("svelte-mirror", lambda *_: 0.75, answered).values())
+    assert found[:2] == ["disagrees", "agrees"]  # a better mirror than the paper's
 
 
 def test_robustness_counts_geometries(answered: Answered) -> None:
@@ -248,6 +250,7 @@ def test_readings_tell_what_decides(answered: Answered) -> None:
     row = next(r for r in experiment.tables(finding.numbers)[2].rows if "about 0.2" in r[0])
     assert row[1:] == ["0 / 0 / 100", "33 / 33", "33 / 33", *[" / ".join(["33"] * 5)] * 2]
     mirror = next(r for r in experiment.tables(finding.numbers)[3].rows if "0.635" in r[0])
+    assert "the gradient method" in mirror[0]
     assert mirror[1:] == ["100 / 100", "100 / 100"]
 
 
