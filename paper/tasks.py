@@ -132,6 +132,7 @@ def _trends(columns: Values, label: str, what: str, unit: str) -> list[Claim]:
     found = []
     for key, worse, title in (("error", 1, f"error ({unit})"), ("snr", -1, "SNR")):
         column = columns[key]
+        shiny = [value for value in column if float(value) >= SHINY]
         groups = [
             _means_over(column, lambda x: x < SHINY),
             _means_over(column, lambda x: x >= SHINY),
@@ -140,8 +141,8 @@ def _trends(columns: Values, label: str, what: str, unit: str) -> list[Claim]:
         found.append(
             Claim(
                 f"On the {label}, the {what} is estimated less well with shiny coatings: {title}.",
-                f"{shown(groups[0])} below a specularity of {SHINY:g}, {shown(groups[1])} at this "
-                "specularity and above",
+                f"{shown(groups[0])} below a specularity of {SHINY:g}, {shown(groups[1])} at "
+                f"{' and '.join(shiny)}",
                 None if larger is None else larger == (worse > 0),
                 "With few contacts, the error and the SNR of a random forest are uncertain. A "
                 "metallic coating can also reflect light to places that had none.",

@@ -137,8 +137,10 @@ def test_objectives_follow_the_tasks_beyond_the_scatter_of_seeds(
             for key, sign in (("error", -1.0), ("snr", 1.0)):
                 for place, (x, third) in enumerate(zip(columns[key], third_seed, strict=True)):
                     columns[key][x] = spread([sign * place, sign * place, sign * float(third)])
-    found = {claim.says: claim.verdict for claim in experiment.claims(numbers)}
-    assert found["RGB2Normal shows the trends of the tasks."] == verdict
+    claims = {claim.says: claim for claim in experiment.claims(numbers)}
+    assert claims["RGB2Normal shows the trends of the tasks."].verdict == verdict
+    trend = next(claim for says, claim in claims.items() if "less well" in says)
+    assert trend.here.endswith(" at 0.8 and 1")
 
 
 @pytest.mark.parametrize(("winner", "verdict"), [(3, "agrees"), (2, "disagrees")])
