@@ -139,7 +139,7 @@ def notes(numbers: Values) -> list[str]:
 
 
 def tables(numbers: Values) -> list[Table]:
-    """Return tables of the margins of each sensor's conclusions."""
+    """Return tables of the margins of the conclusions that each question is about."""
     found = []
     for question in QUESTIONS:
         names = list(question.conclusions)
@@ -150,7 +150,8 @@ def tables(numbers: Values) -> list[Table]:
         ]
         noise = [c["as_assumed"]["standard_deviation"] for c in columns]
         rows.append(["noise", *("none" if one is None else number(one, 2) for one in noise)])
-        found.append(Table(f"Margins, {question.sensor}", ["geometry", *names], rows))
+        title = f"Margins, {question.sensor} ({', '.join(names)})"
+        found.append(Table(title, ["geometry", *names], rows))
     return found
 
 

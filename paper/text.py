@@ -120,6 +120,7 @@ def write_page(page: Path, results: Path, experiments: list[Experiment]) -> None
     repeating = [f"*{each.title}*" for each in experiments if each.repeats_claims]
     without = f" (without {', '.join(repeating)}, which repeats statements)" if repeating else ""
     spent: dict[str, list[float]] = {}
+    quick: list[str] = []
     for experiment in experiments:
         result = read_result(results / experiment.name)
         name = experiment.name
@@ -127,6 +128,7 @@ def write_page(page: Path, results: Path, experiments: list[Experiment]) -> None
         shutil.copyfile(results / name / PICTURE, beside / f"{name}.png")
         chapters.append(chapter(experiment, result, f"{beside.name}/{name}.png"))
         spent |= result["spent"]
+        quick += [f"*{experiment.title}*"] if result["quick"] else []
         verdicts = [claim["verdict"] for claim in result["claims"]]
         for verdict in () if experiment.repeats_claims else verdicts:
             counts[verdict] += 1
@@ -141,9 +143,18 @@ def write_page(page: Path, results: Path, experiments: list[Experiment]) -> None
         "\n".join(["| experiment | statements of the paper |", "| --- | --- |", *rows]),
         f"In total{without}: "
         f"{', '.join(_counted(count, verdict) for verdict, count in counts.items())}.",
-        f"The {len(spent)} evaluations take {processor / 60:.0f} processor minutes.",
+        f"The {len(spent)} evaluations take {processor / 60:.0f} processor minutes. An evaluation "
+        f"that several experiments share is counted once.{_quick_runs(quick)}",
     ]
     write_text(page, "\n\n".join([*head, *(text.rstrip() for text in chapters)]) + "\n")
+
+
+def _quick_runs(titles: list[str]) -> str:
+    """Return a sentence on the experiments that were made with ``--quick``, if there are any."""
+    if not titles:
+        return ""
+    are = "is a quick run" if len(titles) == 1 else "are quick runs"
+    return f" {_listed(titles)} {are} and would take longer in full."
 
 
 def _counted(number: int, verdict: str) -> str:

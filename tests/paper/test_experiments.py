@@ -198,6 +198,8 @@ def test_robustness_counts_geometries(answered: Answered) -> None:
     claim = next(c for c in experiment.claims(finding.numbers) if "cylindrical" in c.says)
     assert claim.verdict == "inconclusive"
     assert claim.here == "holds in 8 of 9 geometries; does not hold for: guide_thickness 6"
+    titles = [table.title for table in experiment.tables(finding.numbers)]
+    assert "Margins, gelsight360 (tip)" in titles and len({*titles}) == len(titles)
 
 
 def test_margins_are_held_against_the_noise_of_single_seeds() -> None:
@@ -288,7 +290,8 @@ def test_the_page_collects_results_beside_it(answered: Answered, tmp_path: Path)
     write_page(page, tmp_path / "out", several)
     text = page.read_text()
     assert f"In total (without *{second.title}*, which repeats statements): " in text
-    assert "The 3 evaluations take 3 processor minutes." in text  # 55 s + 2 x 59 s
+    assert "The 3 evaluations take 3 processor minutes. " in text  # 55 s + 2 x 59 s
+    assert f"*{first.title}* and *{second.title}* are quick runs" in text
     for target in re.findall(r"!\[[^]]*\]\(([^)]+)\)", text):
         assert (page.parent / target).is_file()
     assert sorted(p.name for p in (page.parent / "experiments").iterdir()) == sorted(
