@@ -27,7 +27,7 @@ LONGEST = 130
 
 
 def draw(name: str, entry: AnyEntry) -> Figure:
-    """Return the preview picture of an entry: 990 x 450 pixels when saved by `save`.
+    """Return the preview picture of an entry: 990 x 451 pixels when saved by `save`.
 
     Raises:
         LibraryError: the IES file of a light is missing or malformed.
