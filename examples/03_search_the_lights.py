@@ -1,4 +1,4 @@
-"""Search the positions of a GelSight Mini's red lamps for a better score, and keep the study."""
+"""Search the height and power of a GelSight Mini's red lamps for a better score; keep the study."""
 
 import optisense as ots
 from optisense.search import Around, search
