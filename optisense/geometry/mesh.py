@@ -191,11 +191,20 @@ class TriangleMesh:
     @cached_property
     def edges(self) -> tuple[IntArray, NDArray[np.int64]]:
         """The edges (n, 2) by their vertices, ascending, and the number (n,) of faces of each."""
-        ends = np.sort(self.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64), axis=1)
-        # Pairs are coded as single numbers, which sort ten times faster.
-        size = len(self.vertices)
-        keys, times = np.unique(ends[:, 0] * size + ends[:, 1], return_counts=True)
-        return np.column_stack([keys // size, keys % size]).astype(np.int32), times
+        sides, order = self.sorted_sides
+        keys, times = np.unique(sides[order], return_counts=True)
+        ends = np.divmod(keys, len(self.vertices))
+        return np.column_stack(ends).astype(np.int32), times
+
+    @cached_property
+    def sorted_sides(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """A number (3 m,) for the side after each corner of the faces, the lower of its vertices
+        times n plus the higher one, and the order (3 m,) of these numbers.
+        """
+        # Single numbers sort ten times faster than pairs.
+        starts, ends = self.faces.ravel().astype(np.int64), self.faces[:, [1, 2, 0]].ravel()
+        sides = np.minimum(starts, ends) * len(self.vertices) + np.maximum(starts, ends)
+        return sides, np.argsort(sides, kind="stable")
 
     @cached_property
     def open_edges(self) -> IntArray:

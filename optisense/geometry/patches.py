@@ -68,24 +68,17 @@ def sides_of_faces(mesh: TriangleMesh) -> tuple[NDArray[np.int64], NDArray[np.in
     """Return the vertices (3 m, 2) of the sides of all faces, in an order in which the sides of
     faces that share an edge are successive, and the face (3 m,) of each.
     """
-    sides, order = _sorted_sides(mesh)
+    sides, order = mesh.sorted_sides
     return np.column_stack(np.divmod(sides[order], len(mesh.vertices))), order // 3
 
 
 def inner_edges(mesh: TriangleMesh) -> tuple[NDArray[np.int64], Faces]:
     """Return the vertices (k, 2) of the edges between two faces, and these faces (k, 2)."""
-    sides, order = _sorted_sides(mesh)
+    sides, order = mesh.sorted_sides
     twin = np.flatnonzero(np.diff(sides[order]) == 0)
     one, other = order[twin], order[twin + 1]
     edges = np.divmod(sides[one], len(mesh.vertices))
     return np.column_stack(edges), np.column_stack([one // 3, other // 3])
-
-
-def _sorted_sides(mesh: TriangleMesh) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return a number (3 m,) for the two vertices of each side, low * n + high, and its order."""
-    starts, ends = mesh.faces.ravel().astype(np.int64), mesh.faces[:, [1, 2, 0]].ravel()
-    sides = np.minimum(starts, ends) * len(mesh.vertices) + np.maximum(starts, ends)
-    return sides, np.argsort(sides, kind="stable")
 
 
 def middle(mesh: TriangleMesh, faces: Faces | None = None) -> FloatArray:
