@@ -20,7 +20,7 @@ IntArray = NDArray[np.int32]
 CREASE = 40.0
 """Default angle (degrees) between faces above which an edge always stays sharp in shading: most
 edges of machined parts are at 45 degrees and more, and facets of curved surfaces at a few degrees.
-Below it, bends that belong to no curved surface are sharp; see `_isolated_bends`."""
+Below it, creases between flat faces are sharp; see `_creases`."""
 
 _BOX_SIDES = (  # (axis across the side, the two axes in it, which end of the axis)
     (2, 0, 1, 1), (2, 1, 0, 0), (0, 1, 2, 1), (0, 2, 1, 0), (1, 2, 0, 1), (1, 0, 2, 0),
@@ -288,11 +288,20 @@ class TriangleMesh:
 
     def vertex_normals(self, crease: float = CREASE) -> TriangleMesh:
         """Return the mesh with smooth shading normals, kept apart across edges sharper than
-        `crease` degrees and across weaker ones between flat faces of no curved surface.
+        `crease` degrees and across creases between flat faces that no curved surface explains.
 
         Vertices are split where their corners disagree; see `shading_normals`.
         """
         return self._smooth if crease == CREASE else self._smoothed(crease)
+
+    @cached_property
+    def divided(self) -> tuple[NDArray[np.integer], NDArray[np.integer]]:
+        """Faces (m, 3) whose vertices are divided along creases, and the number (k,) in `vertices`
+        of each of these.
+        """
+        from optisense.geometry._creases import divided_at_creases
+
+        return divided_at_creases(self, CREASE)
 
     @cached_property
     def _smooth(self) -> TriangleMesh:

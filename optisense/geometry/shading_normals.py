@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.array_types import FloatArray
-from optisense.geometry._isolated_bends import divide_at_isolated_bends
 
 if TYPE_CHECKING:
     from optisense.geometry.mesh import TriangleMesh
@@ -36,7 +35,7 @@ def smooth_corners(
         The old number (k,) of each new vertex, faces (m, 3) int32 of the new vertices, and their
         unit normals (k, 3).
     """
-    faces, source = divide_at_isolated_bends(mesh, crease)
+    faces, source = mesh.divided
     vertex = faces.reshape(-1)
     count = len(source)
     normal = np.repeat(mesh.face_normals, 3, axis=0)
