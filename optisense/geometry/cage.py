@@ -122,10 +122,10 @@ def _bent(
     mesh: TriangleMesh, box: ArrayLike, resolution: Resolution, controls: FloatArray
 ) -> TriangleMesh:
     if len(mesh.vertices) * len(controls) <= MOST_KEPT_WEIGHTS:
-        return mesh.with_vertices(deform(kept_weights(mesh, box, resolution), controls))
+        return mesh.deformed(deform(kept_weights(mesh, box, resolution), controls))
     share = box_coordinates(mesh.vertices, box)
     bases = [bernstein(share[:, k], resolution[k]) for k in range(3)]
-    return mesh.with_vertices(contract(bases, controls, resolution))
+    return mesh.deformed(contract(bases, controls, resolution))
 
 
 def kept_weights(mesh: TriangleMesh, box: ArrayLike, resolution: Resolution) -> FloatArray:

@@ -317,7 +317,7 @@ def _assembled(
     mesh: TriangleMesh, whole: NDArray[np.int64], patches: dict[int, Any]
 ) -> TriangleMesh:
     """Return a mesh of whole faces, and patches of other faces (given in the faces' frames)."""
-    kept = TriangleMesh(mesh.vertices, mesh.faces[np.sort(whole)], mesh.normals).compacted()
+    kept = mesh.with_faces(mesh.faces[np.sort(whole)]).compacted()
     faces = np.array(list(patches), dtype=np.int64)
     polygons, owner = shapely.get_parts(
         _without_slivers(np.array(list(patches.values()), dtype=object)), return_index=True

@@ -41,11 +41,14 @@ class TriangleMesh:
         vertices: (n, 3) float64, mm.
         faces: (m, 3) int32, rows of `vertices`.
         normals: (n, 3) float64 unit shading normals of the vertices, or None.
+        rest: the same faces before they were deformed, whose creases remain sharp; None if they
+            were not. It is not compared.
     """
 
     vertices: FloatArray
     faces: IntArray
     normals: FloatArray | None = None
+    rest: TriangleMesh | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vertices", _fixed_rows(self.vertices, np.float64))
@@ -63,7 +66,7 @@ class TriangleMesh:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the arrays alone; they are read-only again when the mesh is made of them."""
-        return TriangleMesh, (self.vertices, self.faces, self.normals)
+        return TriangleMesh, (self.vertices, self.faces, self.normals, self.rest)
 
     # ---- making
 
@@ -125,6 +128,9 @@ class TriangleMesh:
             np.concatenate([mesh.vertices for mesh in meshes]),
             np.concatenate([m.faces + o for m, o in zip(meshes, offsets, strict=True)]),
             np.concatenate(normals) if len(normals) == len(meshes) else None,
+            None
+            if all(mesh.rest is None for mesh in meshes)
+            else TriangleMesh.joined([mesh.rest or mesh for mesh in meshes]),
         )
 
     def save_obj(self, path: str | Path) -> None:
@@ -243,32 +249,42 @@ class TriangleMesh:
         given = np.asarray(matrix, dtype=np.float64)
         full[: given.shape[0], : given.shape[1]] = given
         linear = full[:3, :3]
-        faces = self.faces if np.linalg.det(linear) > 0 else self.faces[:, ::-1]
+        same = self if np.linalg.det(linear) > 0 else replace(self, normals=None).flipped()
         normals = None
         if self.normals is not None:
             normals = self.normals @ np.linalg.inv(linear)
             normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        return TriangleMesh(self.vertices @ linear.T + full[:3, 3], faces, normals)
+        return replace(same, vertices=self.vertices @ linear.T + full[:3, 3], normals=normals)
 
     def with_vertices(self, vertices: FloatArray) -> TriangleMesh:
-        """Return the same faces with moved vertices (n, 3), mm; shading normals are dropped."""
+        """Return a new shape of the same faces, with vertices (n, 3), mm; shading normals are
+        dropped.
+        """
         return TriangleMesh(vertices, self.faces)
+
+    def deformed(self, vertices: FloatArray) -> TriangleMesh:
+        """Return the mesh with its vertices moved to (n, 3), mm; shading normals are dropped, and
+        its creases remain sharp however the faces beside them bend.
+        """
+        return TriangleMesh(vertices, self.faces, rest=self.rest or self._as_rest)
 
     def with_faces(self, faces: NDArray[Any]) -> TriangleMesh:
         """Return other faces (k, 3) with the same vertices and normals."""
-        return replace(self, faces=faces)
+        rest = None if self.rest is None else self.rest.with_faces(faces)
+        return replace(self, faces=faces, rest=rest)
 
     def compacted(self) -> TriangleMesh:
         """Return the mesh without unused vertices."""
         used, inverse = np.unique(self.faces, return_inverse=True)
         faces = inverse.reshape(-1, 3).astype(np.int32)
         normals = None if self.normals is None else self.normals[used]
-        return TriangleMesh(self.vertices[used], faces, normals)
+        rest = None if self.rest is None else self.rest.compacted()
+        return TriangleMesh(self.vertices[used], faces, normals, rest)
 
     def flipped(self) -> TriangleMesh:
         """Return the same surface with opposite face normals."""
         normals = None if self.normals is None else -self.normals
-        return replace(self, faces=self.faces[:, ::-1], normals=normals)
+        return replace(self.with_faces(self.faces[:, ::-1]), normals=normals)
 
     def welded(self, distance: float = WELD_DISTANCE) -> TriangleMesh:
         """Return the mesh with vertices that agree to `distance` (mm) merged, and without faces
@@ -288,11 +304,18 @@ class TriangleMesh:
 
     def vertex_normals(self, crease: float = CREASE) -> TriangleMesh:
         """Return the mesh with smooth shading normals, kept apart across edges sharper than
-        `crease` degrees and across creases between flat faces that no curved surface explains.
+        `crease` degrees and across creases between flat faces; see `_creases`.
 
         Vertices are split where their corners disagree; see `shading_normals`.
         """
         return self._smooth if crease == CREASE else self._smoothed(crease)
+
+    @cached_property
+    def _as_rest(self) -> TriangleMesh:
+        """The shape alone, so that deformed meshes keep no reference to a mesh that is no more
+        used: caches by mesh, which hold deformed ones, would never be freed.
+        """
+        return TriangleMesh(self.vertices, self.faces)
 
     @cached_property
     def divided(self) -> tuple[NDArray[np.integer], NDArray[np.integer]]:
@@ -301,7 +324,7 @@ class TriangleMesh:
         """
         from optisense.geometry._creases import divided_at_creases
 
-        return divided_at_creases(self, CREASE)
+        return divided_at_creases(self, CREASE) if self.rest is None else self.rest.divided
 
     @cached_property
     def _smooth(self) -> TriangleMesh:

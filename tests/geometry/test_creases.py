@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from optisense.geometry import TriangleMesh
+from optisense.geometry import TriangleMesh, cage_points
+from optisense.geometry.cage import deformed
 from optisense.sensors._shapes import arc, revolve, ribbon
 
 RISE = np.tan(np.radians(10.0))
@@ -53,6 +54,21 @@ def test_a_ridge_is_sharp_beside_small_fillets() -> None:
     half = [slope, *fillet]
     roof = ribbon([*((-x, z) for x, z in half[::-1]), (0, 8 * RISE), *half], 3.0, 1)
     assert len(roof.vertex_normals().vertices) == len(roof.vertices) + 2
+
+
+def test_a_deformed_crease_remains_sharp() -> None:
+    roof = ribbon([(-8, 0), (0, 8 * RISE), (8, 0)], 3.0, 4)
+    box = roof.bounds + [[-1.0], [1.0]]
+    points = cage_points(box, (3, 3, 3))
+    points[0] += 0.001
+    bent = deformed(roof, box, (3, 3, 3), points)
+    mirrored = bent.transformed(np.diag([1.0, 1.0, -1.0]))
+    for mesh in (bent, bent.deformed(1.1 * bent.vertices), bent.flipped(), mirrored):
+        assert len(mesh.vertex_normals().vertices) == len(roof.vertices) + 5
+    assert bent.rest is not roof  # which is a weak key of caches that hold deformed meshes
+    pair = TriangleMesh.joined([bent, roof.with_faces(roof.faces[::2])]).compacted()
+    one_side = pair.with_faces(pair.faces[: len(bent.faces)]).compacted()
+    assert len(one_side.vertex_normals().vertices) == len(roof.vertices) + 5
 
 
 def test_the_order_of_the_array_of_faces_is_of_no_importance() -> None:

@@ -85,7 +85,7 @@ class Cutting:
         if not same_faces(cut.whole, whole) or cut.anchors is None:
             return None
         pieces = [
-            piece.with_vertices(anchors.on(whole.vertices))
+            piece.deformed(anchors.on(whole.vertices))
             for piece, anchors in zip(cut.pieces, cut.anchors, strict=True)
         ]
         return Cutting(inputs, self.name, whole, pieces, cut)

@@ -94,7 +94,7 @@ class Bending:
             if np.abs(places[0] - face.mesh.vertices).max(initial=0.0) <= UNMOVED_TOLERANCE:
                 result.append(face)  # the same mesh, with its cached properties
             else:
-                result.append(replace(face, mesh=face.mesh.with_vertices(places[0])))
+                result.append(replace(face, mesh=face.mesh.deformed(places[0])))
         return result
 
     def _anchors(self, mesh: TriangleMesh, solid: str) -> tuple[Anchors, NDArray[np.bool_]]:
