@@ -20,3 +20,24 @@ def test_facets_with_their_own_normals_remain_flat() -> None:
         assert len(mesh.faces) == 10
         piece = cache.piece("mirror", mesh, Surface(SurfaceKind.MIRROR))
         assert (piece.normals is None) == flat
+
+
+def test_facets_with_vertices_of_their_own_but_without_normals_are_smooth() -> None:
+    sheet = ribbon(arc((0.0, 0.0), 5.0, 0.0, 90.0, 9), 3.0, 1)
+    facets = [sheet.with_faces(sheet.faces[[k, k + 9]]).compacted() for k in range(9)]
+    cache = AssemblyCache()
+    mesh = cache.merge(TriangleMesh.joined(facets))
+    piece = cache.piece("mirror", mesh, Surface(SurfaceKind.MIRROR))
+    assert piece.normals is not None
+
+
+def test_flat_faces_remain_flat_when_they_become_single_triangles() -> None:
+    corners = np.array([[4, 4, 0], [-4, 4, 0], [-4, -4, 0], [4, -4, 0], [0, 0, 1]])
+    sides = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
+    middles = 5 + np.arange(4)
+    faces = [np.column_stack([sides[:, [k, (k + 1) % 3]], middles]) for k in range(3)]
+    vertices = np.concatenate([corners, corners[sides].mean(axis=1)])
+    cache = AssemblyCache()
+    mesh = cache.merge(TriangleMesh(vertices, np.concatenate(faces)))
+    assert len(mesh.faces) == 4
+    assert cache.piece("mirror", mesh, Surface(SurfaceKind.MIRROR)).normals is None

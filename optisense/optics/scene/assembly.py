@@ -292,9 +292,10 @@ def _merged(mesh: TriangleMesh) -> TriangleMesh:
     if not _is_flat(_shaded(mesh)):
         return mesh
     merged = merge_coplanar(mesh)
-    # Triangles that share no vertices tell nothing about their edges, as in STL files.
-    silent = mesh.normals is None and len(mesh.vertices) == 3 * len(mesh.faces)
-    if silent or _is_flat(_shaded(merged)):
+    if _is_flat(_shaded(merged)):
+        return merged
+    # Vertices that are split without normals say nothing about the edges between their faces.
+    if mesh.normals is None and not _is_flat(mesh.welded().vertex_normals()):
         return merged
     corners = merged.triangles.reshape(-1, 3)
     own = np.repeat(merged.face_normals, 3, axis=0)
