@@ -55,8 +55,8 @@ def repaired(mesh: TriangleMesh, name: str, closed: bool) -> tuple[TriangleMesh,
         closed: whether it must enclose a volume.
 
     Returns:
-        The mesh (closed meshes have outward face normals; shading normals are kept only by an open
-        mesh that needed no repair) and a list of the changes, one sentence each.
+        The welded mesh without shading normals (closed meshes have outward face normals), and a
+        list of the changes, one sentence each.
 
     Raises:
         MeshError: no faces, not finite, holes, edges of more than two faces, faces that cut through
@@ -93,8 +93,7 @@ def repaired(mesh: TriangleMesh, name: str, closed: bool) -> tuple[TriangleMesh,
         _tell_of_turned((mended.faces != sealed.faces).any(axis=1), notes)
     else:
         mended = _consistent(mended if sealed is None else sealed, notes)
-    as_read = not (closed or notes) and (sealed is None or mesh.is_closed)
-    return (mesh if as_read else mended), notes
+    return mended, notes
 
 
 def narrow_openings(mesh: TriangleMesh) -> str | None:

@@ -222,3 +222,12 @@ def test_a_sheet_to_walk_on_has_at_most_two_faces_at_an_edge() -> None:
     refuse_bad_sheet(sheet, "skin")
     with pytest.raises(MeshError, match="more than two faces"):
         refuse_bad_sheet(TriangleMesh.joined([sheet, fin]), "skin")
+
+
+def test_normals_in_a_file_are_used_neither_for_solids_nor_for_sheets() -> None:
+    sheet = TriangleMesh.grid((2.0, 2.0), (2, 2))
+    corners = sheet.triangles.reshape(-1, 3)
+    faces = np.arange(len(corners)).reshape(-1, 3)
+    apart = TriangleMesh(corners, faces, np.repeat(sheet.face_normals, 3, axis=0))
+    mesh, notes = repaired(apart, "mirror", closed=False)
+    assert (mesh.normals, len(mesh.vertices), notes) == (None, 9, [])
