@@ -218,9 +218,9 @@ class SensingSurface:
             face = across[0]
             direction = self._unfolded(direction, ends, face)
         raise MeshError(
-            "the path to a place on the sensing surface does not end, as it has no edge there, or "
+            "the path to a place on a surface does not end, as the surface has no edge there, or "
             "its mesh has degenerate triangles",
-            hint="Export the mesh of the sensing surface again",
+            hint="Export the mesh of the surface again",
         )
 
     def _unfolded(self, direction: FloatArray, ends: list[int], face: int) -> FloatArray:
