@@ -12,6 +12,7 @@ from optisense.design.posing import triple
 from optisense.errors import ContactError, DesignError
 from optisense.geometry import SensingSurface, TriangleMesh, ray_hits
 from optisense.geometry.patches import Faces, mean_normal, middle
+from optisense.geometry.repair import without_holes
 from optisense.sensors.from_meshes.directions import Direction, axis_of, radial_vector, vector
 from optisense.sensors.from_meshes.recipe_lights import LightRow, LightsOver, Ring
 
@@ -152,12 +153,13 @@ def _grid(
     points = mesh.vertices[np.unique(mesh.faces[patch])]
     height = (points - centre) @ normal
     if np.ptp(height) > FLAT:
-        part = mesh.with_faces(mesh.faces[patch]).compacted()
-        place = _in_front(part, centre, normal)
+        part = mesh.with_faces(mesh.faces[patch]).compacted().welded()
+        whole = without_holes(part)
+        place = _in_front(whole, centre, normal)
         if place is None:
             raise _off(where, 0.0, 0.0)
-        surface = SensingSurface(part, place, along, across)
-        return _on_curve(surface, count, pitch, where)
+        real, surface = (SensingSurface(each, place, along, across) for each in (part, whole))
+        return _on_curve(real, surface, count, pitch, where)
     columns, rows = evenly(count[0], pitch[0], size[0]), evenly(count[1], pitch[1], size[1])
     flat = shapely.union_all(
         shapely.polygons(
@@ -186,12 +188,15 @@ def _in_front(mesh: TriangleMesh, centre: FloatArray, normal: FloatArray) -> Flo
 
 
 def _on_curve(
+    real: SensingSurface,
     surface: SensingSurface,
     count: tuple[int, int],
     pitch: tuple[float | None, float | None],
     where: str,
 ) -> list[tuple[FloatArray, FloatArray]]:
-    """Return lights as on a flat surface, but with distances measured along the surface."""
+    """Return lights as on a flat surface, but with distances measured along the surface, which is
+    the real one with its holes closed.
+    """
 
     def places(number: int) -> FloatArray:
         if pitch[number] is not None:
@@ -208,7 +213,10 @@ def _on_curve(
                 spot = surface.point_at(float(u), float(v))
             except ContactError:
                 raise _off(where, u, v) from None
-            spots.append((spot.point, spot.inward))
+            found = real.nearest(spot.point)
+            if np.linalg.norm(found.point - spot.point) > FLAT:
+                raise _off(where, u, v)
+            spots.append((found.point, found.inward))
     return spots
 
 

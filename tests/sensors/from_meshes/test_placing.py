@@ -114,6 +114,25 @@ class TestOver:
         found = np.degrees(np.arctan2(places(lights)[:, 1], -places(lights)[:, 2]))
         np.testing.assert_allclose(np.sort(found), angles, atol=0.2)
 
+    def test_holes_of_a_curved_board_do_not_end_it(self) -> None:
+        """In a half pipe without two cells, beside the row of lights or under one."""
+        turn = np.radians(np.linspace(-90.0, 90.0, 25))
+        arc = np.stack([np.zeros(25), 10.0 * np.sin(turn), -10.0 * np.cos(turn)], axis=1)
+        vertices = np.concatenate([arc + (x, 0.0, 0.0) for x in (-8.0, -1.0, 1.0, 8.0)])
+        pipe = TriangleMesh(vertices, grid_faces(4, 25))
+        angles = np.degrees(np.arctan2(pipe.triangles.mean(1)[:, 1], -pipe.triangles.mean(1)[:, 2]))
+        middle = np.abs(pipe.triangles.mean(1)[:, 0]) < 1.0
+        choice = {"count": [4, 1], "within": 88}
+
+        def holed(low: float, high: float) -> TriangleMesh:
+            return pipe.with_faces(pipe.faces[~(middle & (angles > low) & (angles < high))])
+
+        lights = self.spots(holed(-7.5, 7.5), **choice)
+        found = np.sort(np.degrees(np.arctan2(places(lights)[:, 1], -places(lights)[:, 2])))
+        np.testing.assert_allclose(found, [-67.5, -22.5, 22.5, 67.5], atol=0.5)
+        with pytest.raises(DesignError, match="off it, or in a hole"):
+            self.spots(holed(15.0, 30.0), **choice)
+
     def test_a_surface_that_looks_everywhere_is_refused(self) -> None:
         shape = LightsOver(file="b.stl", count=3)
         with pytest.raises(DesignError, match="faces all sides"):
