@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 from comparing import SCORE_ROUNDING, same_light
+from pressed_balls import Presses, pressed_ball
 
 import optisense as ots
 from optisense import library
@@ -125,11 +125,9 @@ def test_brighter_lights_of_the_same_colours_change_nothing(relighting: Relighti
         assert one == pytest.approx(other, rel=SCORE_ROUNDING)
 
 
-def test_one_colour_for_all_pixels_tells_no_normal(
-    make_press: Callable[..., Press], evaluation_of: Callable[..., Any]
-) -> None:
-    press = make_press(lambda n: np.full((len(n), 3), 0.3))
-    value, parts, _ = find("rgb2normal")(evaluation_of(press))
+def test_one_colour_for_all_pixels_tells_no_normal() -> None:
+    press = pressed_ball(lambda n: np.full((len(n), 3), 0.3))
+    value, parts, _ = find("rgb2normal")(Presses(press))
     assert (value, parts["worst_line"]) == (0.0, 0.0)
 
 
