@@ -8,6 +8,7 @@ GelSight Mini.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from paper.claims import Claim, Table
@@ -15,7 +16,8 @@ from paper.evaluations import perception, sensor
 from paper.experiment import Experiment, Finding, Pictures, Steps, Values
 from paper.figures import COLOURS, finish, line
 from paper.mini_shapes import OBJECTIVES, SHAPES, curves, score_units
-from paper.spread import by_seed, exceeds, is_larger, number, shown, spearman, spread
+from paper.spread import Spread, by_seed, exceeds, is_larger, number, shown, spearman, spread
+from paper.text import listed
 from paper.unit import Unit
 
 if TYPE_CHECKING:
@@ -132,17 +134,15 @@ def _trends(columns: Values, label: str, what: str, unit: str) -> list[Claim]:
     found = []
     for key, worse, title in (("error", 1, f"error ({unit})"), ("snr", -1, "SNR")):
         column = columns[key]
-        shiny = [value for value in column if float(value) >= SHINY]
-        groups = [
-            _means_over(column, lambda x: x < SHINY),
-            _means_over(column, lambda x: x >= SHINY),
-        ]
-        larger = is_larger(groups[1], groups[0])
+        shiny = {value: each for value, each in column.items() if float(value) >= SHINY}
+        dull = _mean_of(each for value, each in column.items() if value not in shiny)
+        bright = _mean_of(shiny.values())
+        larger = is_larger(bright, dull)
         found.append(
             Claim(
                 f"On the {label}, the {what} is estimated less well with shiny coatings: {title}.",
-                f"{shown(groups[0])} below a specularity of {SHINY:g}, {shown(groups[1])} at "
-                f"{' and '.join(shiny)}",
+                f"{shown(dull)} below a specularity of {SHINY:g}, {shown(bright)} at "
+                f"{listed(list(shiny))}",
                 None if larger is None else larger == (worse > 0),
                 "With few contacts, the error and the SNR of a random forest are uncertain. A "
                 "metallic coating can also reflect light to places that had none.",
@@ -151,12 +151,10 @@ def _trends(columns: Values, label: str, what: str, unit: str) -> list[Claim]:
     return found
 
 
-def _means_over(column: Values, wanted: object) -> Values:
-    """Return the mean over the coatings whose specularity is wanted, seed by seed."""
-    assert callable(wanted)
-    rows = [each["values"] for x, each in column.items() if wanted(float(x))]
+def _mean_of(cells: Iterable[Spread]) -> Spread:
+    """Return the mean over coatings, seed by seed."""
     means = []
-    for values in zip(*rows, strict=True):
+    for values in zip(*(each["values"] for each in cells), strict=True):
         there = [value for value in values if value is not None]
         means.append(sum(there) / len(there) if there else None)
     return spread(means)

@@ -54,11 +54,11 @@ def _verdicts(claims: list[Mapping[str, Any]]) -> str:
             reasons.setdefault(claim["why"], []).append(str(number))
     for why, numbers in reasons.items():
         which = "Statement" if len(numbers) == 1 else "Statements"
-        lines += ["", f"*{which} {_listed(numbers)}.* {why}"]
+        lines += ["", f"*{which} {listed(numbers)}.* {why}"]
     return "\n".join(lines)
 
 
-def _listed(words: list[str]) -> str:
+def listed(words: list[str]) -> str:
     """Return words as an enumeration, such as ``1, 2 and 3``."""
     return " and ".join(part for part in (", ".join(words[:-1]), words[-1]) if part)
 
@@ -154,7 +154,7 @@ def _quick_runs(titles: list[str]) -> str:
     if not titles:
         return ""
     are = "is a quick run" if len(titles) == 1 else "are quick runs"
-    return f" {_listed(titles)} {are} and would take longer in full."
+    return f" {listed(titles)} {are} and would take longer in full."
 
 
 def _counted(number: int, verdict: str) -> str:
