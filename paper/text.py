@@ -154,7 +154,7 @@ def _quick_runs(titles: list[str]) -> str:
     if not titles:
         return ""
     are = "is a quick run" if len(titles) == 1 else "are quick runs"
-    return f" {listed(titles)} {are} and would take longer in full."
+    return f" {listed(titles)} {are}."
 
 
 def _counted(number: int, verdict: str) -> str:

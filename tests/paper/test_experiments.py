@@ -293,7 +293,7 @@ def test_the_page_collects_results_beside_it(answered: Answered, tmp_path: Path)
     text = page.read_text()
     assert f"In total (without *{second.title}*, which repeats statements): " in text
     assert "The 3 evaluations take 3 processor minutes. " in text  # 55 s + 2 x 59 s
-    assert f"*{first.title}* and *{second.title}* are quick runs" in text
+    assert f"*{first.title}* and *{second.title}* are quick runs.\n" in text
     for target in re.findall(r"!\[[^]]*\]\(([^)]+)\)", text):
         assert (page.parent / target).is_file()
     assert sorted(p.name for p in (page.parent / "experiments").iterdir()) == sorted(
