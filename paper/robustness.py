@@ -150,8 +150,7 @@ def tables(numbers: Values) -> list[Table]:
         ]
         noise = [c["as_assumed"]["standard_deviation"] for c in columns]
         rows.append(["noise", *("none" if one is None else number(one, 2) for one in noise)])
-        title = f"Margins, {question.sensor} ({', '.join(names)})"
-        found.append(Table(title, ["geometry", *names], rows))
+        found.append(Table(f"Margins, {question.title}", ["geometry", *names], rows))
     return found
 
 

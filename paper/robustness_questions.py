@@ -36,6 +36,7 @@ class Question:
     """Evaluations of one geometry of a sensor, and the margins that follow from them.
 
     Attributes:
+        title: what the question is about, for readers.
         sensor: name of a built-in sensor.
         conclusions: conclusions of the paper by short names.
         units: returns the units from dimensions, settings and a seed.
@@ -43,6 +44,7 @@ class Question:
         has_chance: whether the results depend on the seed.
     """
 
+    title: str
     sensor: str
     conclusions: Mapping[str, str]
     units: Callable[[Dimensions, Values, int], list[Unit]]
@@ -185,6 +187,7 @@ def _difference(one: Record, other: Record, name: str) -> float | None:
 
 QUESTIONS = (
     Question(
+        "coating of the cylindrical GelSight Mini",
         "gelsight-mini-ideal-cylindrical",
         {
             f"mini {name}": f"On the cylindrical Mini, a specularity of {LOW} is better than "
@@ -195,6 +198,7 @@ QUESTIONS = (
         _mini_margins,
     ),
     Question(
+        "lights of GelBelt",
         "gelbelt",
         {
             **{
@@ -208,18 +212,21 @@ QUESTIONS = (
         _belt_margins,
     ),
     Question(
+        "colours of GelSight360",
         "gelsight360",
         {"colours": f"GelSight360's colouring {FOUND} is better than the original by NormDiff."},
         _colour_units,
         _colour_margins,
     ),
     Question(
+        "tip of GelSight360",
         "gelsight360",
         {"tip": "GelSight360's tip with the best 2to3PW is 6 or a neighbour of it."},
         _tip_units,
         _tip_margins,
     ),
     Question(
+        "mirror of GelSight Svelte",
         "gelsight-svelte",
         {
             "mirror": f"Bending GelSight Svelte's mirror raises AOAP to {LEAST_GAIN:g} times its "

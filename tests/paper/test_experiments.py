@@ -201,7 +201,7 @@ def test_robustness_counts_geometries(answered: Answered) -> None:
     assert claim.verdict == "inconclusive"
     assert claim.here == "holds in 8 of 9 geometries; does not hold for: guide_thickness 6"
     titles = [table.title for table in experiment.tables(finding.numbers)]
-    assert "Margins, gelsight360 (tip)" in titles and len({*titles}) == len(titles)
+    assert "Margins, tip of GelSight360" in titles and len({*titles}) == len(titles)
 
 
 def test_margins_are_held_against_the_noise_of_single_seeds() -> None:
