@@ -129,8 +129,8 @@ def without_holes(mesh: TriangleMesh) -> TriangleMesh:
 def outward(mesh: TriangleMesh) -> TriangleMesh:
     """Return a closed mesh, whose faces agree with their neighbours, with bodies that look outward.
 
-    A shell inside a body is a cavity if it is drawn contrary to the outermost shell around it, and
-    a body if it is drawn alike. Bodies may overlap.
+    A shell inside a body is a cavity if it is drawn contrary to the innermost body around it, and a
+    body if it is drawn alike. Bodies may overlap.
     """
     labels = shells(mesh)
     cones = np.einsum("ij,ij->i", mesh.triangles[:, 0], mesh.face_vectors) / 6.0
@@ -139,9 +139,7 @@ def outward(mesh: TriangleMesh) -> TriangleMesh:
         return mesh
     if not inward.all():
         within = _within(_shapes_of(mesh, labels), None)
-        outermost = within & ~within.any(axis=1)
-        contrary = outermost.any(axis=1) & (inward != inward[outermost.argmax(axis=1)])
-        inward = inward != _cavities(within, contrary)
+        inward = inward != _cavities(within, inward)
     over = inward[labels]
     return mesh.with_faces(np.where(over[:, None], mesh.faces[:, ::-1], mesh.faces))
 
@@ -320,8 +318,7 @@ def _outward(mesh: TriangleMesh, where: str, notes: list[str]) -> TriangleMesh:
     area = np.bincount(labels, mesh.face_areas)
     over = 2.0 * np.bincount(labels, mesh.face_areas * turned) > area
     for label in [] if turned.all() else np.flatnonzero(cavities).tolist():
-        outermost = np.flatnonzero(within[label] & ~within.any(axis=1))[0]
-        if over[label] != over[outermost]:
+        if over[label] != over[_innermost_body(within, cavities, label)]:
             turned[labels == label] = False
             notes.append(
                 f"the body near {_point(bodies[label].bounds.mean(axis=0))} mm, which lies inside "
@@ -332,18 +329,27 @@ def _outward(mesh: TriangleMesh, where: str, notes: list[str]) -> TriangleMesh:
     return mesh.with_faces(faces)
 
 
-def _cavities(within: BoolArray, contrary: BoolArray | None = None) -> BoolArray:
-    """Return a mask (n,) of the shells that are cavities: those inside a body, or only the contrary
-    (n,) ones of these. A shell in empty space is a body.
+def _cavities(within: BoolArray, inward: BoolArray | None = None) -> BoolArray:
+    """Return a mask (n,) of the shells that are cavities: those inside a body. A shell in empty
+    space is a body.
 
     Args:
         within: mask (n, n) of the shells (rows) that lie inside others (columns).
+        inward: mask (n,) of the shells that are drawn inward. If it is given, shells drawn like the
+            innermost body around them are bodies, too.
     """
     cavities = np.zeros(len(within), dtype=bool)
-    for shell in np.argsort(within.sum(axis=1), kind="stable"):  # from outside to inside
+    for shell in np.argsort(within.sum(axis=1), kind="stable").tolist():  # from outside to inside
         bodies = within[shell] @ np.where(cavities, -1, 1)
-        cavities[shell] = bodies > 0 and (contrary is None or contrary[shell])
+        cavities[shell] = bodies > 0 and (
+            inward is None or inward[shell] != inward[_innermost_body(within, cavities, shell)]
+        )
     return cavities
+
+
+def _innermost_body(within: BoolArray, cavities: BoolArray, shell: int) -> int:
+    """Return the number of the innermost body that contains a shell, which lies inside one."""
+    return int(np.argmax(np.where(within[shell] & ~cavities, within.sum(axis=1), -1)))
 
 
 def _tell_of_turned(turned: BoolArray, notes: list[str]) -> None:

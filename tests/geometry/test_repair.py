@@ -92,9 +92,13 @@ def test_bodies_of_an_opaque_part_look_outward_and_its_cavities_inward() -> None
 def test_a_shell_in_a_cavity_is_a_body_however_it_was_drawn(closed: bool) -> None:
     hollow = TriangleMesh.box((2, 2, 1), (4, 4, 3)).flipped()
     loose = TriangleMesh.box((2.5, 2.5, 1.5), (3.5, 3.5, 2.5))
-    for drawn in (loose, loose.flipped()):
+    within = TriangleMesh.box((2.75, 2.75, 1.75), (3.25, 3.25, 2.25)).flipped()
+    for drawn, cavity in ((loose, within), (loose.flipped(), within.flipped())):
         mesh, _ = repaired(TriangleMesh.joined([BLOCK, hollow, drawn]), "gel", closed)
         assert mesh.volume == pytest.approx(VOLUME - 8.0 + 1.0)
+        mesh, notes = repaired(TriangleMesh.joined([BLOCK, hollow, drawn, cavity]), "gel", closed)
+        assert mesh.volume == pytest.approx(VOLUME - 8.0 + 1.0 - 0.125)
+        assert not any("became a cavity" in note for note in notes)
 
 
 @pytest.mark.parametrize("at", [(10, 2, 1), (10, 8, 3), (10, 8, 4), (2, 2, 4 - 5e-5)])
