@@ -142,6 +142,7 @@ def kept_weights(mesh: TriangleMesh, box: ArrayLike, resolution: Resolution) -> 
         weights.flags.writeable = False
         kept = key, weights
         with _lock:
+            _weights.pop(mesh, None)  # else the new weights would keep the place of the old ones
             _weights[mesh] = kept
             while sum(each.size for _, each in _weights.values()) > KEPT_WEIGHTS:
                 del _weights[next(iter(_weights))]

@@ -132,6 +132,12 @@ def test_the_oldest_of_many_weights_are_dropped(monkeypatch: pytest.MonkeyPatch)
     for mesh, weights in zip(meshes[1:], others, strict=True):
         assert kept_weights(mesh, BOX, (3, 3, 3)) is weights
     assert kept_weights(meshes[0], BOX, (3, 3, 3)) is not first
+    cage._weights.clear()
+    larger = BOX + [[-1.0], [1.0]]
+    kept_weights(meshes[0], BOX, (3, 3, 3)), kept_weights(meshes[1], BOX, (3, 3, 3))
+    newest = kept_weights(meshes[0], larger, (3, 3, 3))
+    kept_weights(meshes[2], BOX, (3, 3, 3))
+    assert kept_weights(meshes[0], larger, (3, 3, 3)) is newest
 
 
 def test_a_fine_cage_without_kept_weights_agrees_with_one_that_keeps_them() -> None:
