@@ -155,6 +155,8 @@ def overlapping_boxes(
         near = ((low <= other_high.max(axis=0)) & (high >= other_low.min(axis=0))).all(axis=1)
         if not near.all():
             rows[this], boxes[this] = rows[this][near], (low[near], high[near])
+        elif turn > 0:  # neither set would become smaller any more
+            break
     if not all(map(len, rows)):
         return rows[0][:0], rows[1][:0]
     (low_1, high_1), (low_2, high_2) = boxes
