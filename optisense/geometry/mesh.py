@@ -198,9 +198,10 @@ class TriangleMesh:
     def edges(self) -> tuple[IntArray, NDArray[np.int64]]:
         """The edges (n, 2) by their vertices, ascending, and the number (n,) of faces of each."""
         sides, order = self.sorted_sides
-        keys, times = np.unique(sides[order], return_counts=True)
-        ends = np.divmod(keys, len(self.vertices))
-        return np.column_stack(ends).astype(np.int32), times
+        ascending = sides[order]
+        first = np.flatnonzero(np.diff(ascending, prepend=-1))
+        ends = np.divmod(ascending[first], len(self.vertices))
+        return np.column_stack(ends).astype(np.int32), np.diff(first, append=len(ascending))
 
     @cached_property
     def sorted_sides(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
