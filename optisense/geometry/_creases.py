@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from optisense.array_types import BoolArray, FloatArray, IntArray
 from optisense.geometry.connected import connected_components
 from optisense.geometry.patches import inner_edges
+from optisense.geometry.shading_normals import CREASE
 
 if TYPE_CHECKING:
     from optisense.geometry.mesh import TriangleMesh
@@ -48,7 +49,7 @@ them, but a flat face with a bevel at either side."""
 
 
 def divided_at_creases(
-    mesh: TriangleMesh, sharp: float
+    mesh: TriangleMesh,
 ) -> tuple[NDArray[np.integer], NDArray[np.integer]]:
     """Divide the vertices of a mesh along its creases.
 
@@ -57,7 +58,6 @@ def divided_at_creases(
 
     Args:
         mesh: the mesh, whose faces are connected where they share vertices.
-        sharp: angle (degrees) above which all edges are sharp.
 
     Returns:
         Faces (m, 3) of the divided vertices, and the old number (k,) of each of these.
@@ -67,7 +67,7 @@ def divided_at_creases(
     one, other = pairs.T
     normals = mesh.face_normals
     cosine = np.einsum("ij,ij->i", normals.take(one, axis=0), normals.take(other, axis=0))
-    smooth = cosine >= np.cos(np.radians(sharp))
+    smooth = cosine >= np.cos(np.radians(CREASE))
     possible = np.flatnonzero(smooth & (cosine < np.cos(np.radians(LEAST))))
     if not len(possible):
         return mesh.faces, own

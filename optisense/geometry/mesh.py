@@ -17,11 +17,6 @@ from optisense.geometry.mesh_files import obj_text, read_mesh
 
 IntArray = NDArray[np.int32]
 
-CREASE = 40.0
-"""Default angle (degrees) between faces above which an edge always stays sharp in shading: most
-edges of machined parts are at 45 degrees and more, and facets of curved surfaces at a few degrees.
-Below it, creases between flat faces are sharp; see `_creases`."""
-
 _BOX_SIDES = (  # (axis across the side, the two axes in it, which end of the axis)
     (2, 0, 1, 1), (2, 1, 0, 0), (0, 1, 2, 1), (0, 2, 1, 0), (1, 2, 0, 1), (1, 0, 2, 0),
 )  # fmt: skip
@@ -303,13 +298,13 @@ class TriangleMesh:
         wrong = np.einsum("ij,ij->i", shading, self.face_vectors) < 0.0
         return self.with_faces(np.where(wrong[:, None], self.faces[:, ::-1], self.faces))
 
-    def vertex_normals(self, crease: float = CREASE) -> TriangleMesh:
-        """Return the mesh with smooth shading normals, kept apart across edges sharper than
-        `crease` degrees and across creases between flat faces; see `_creases`.
+    def vertex_normals(self) -> TriangleMesh:
+        """Return the mesh with smooth shading normals, kept apart across edges of more than 40
+        degrees and across creases between flat faces; see `_creases`.
 
         Vertices are split where their corners disagree; see `shading_normals`.
         """
-        return self._smooth if crease == CREASE else self._smoothed(crease)
+        return self._smooth
 
     @cached_property
     def _as_rest(self) -> TriangleMesh:
@@ -325,16 +320,13 @@ class TriangleMesh:
         """
         from optisense.geometry._creases import divided_at_creases
 
-        return divided_at_creases(self, CREASE) if self.rest is None else self.rest.divided
+        return divided_at_creases(self) if self.rest is None else self.rest.divided
 
     @cached_property
     def _smooth(self) -> TriangleMesh:
-        return self._smoothed(CREASE)
-
-    def _smoothed(self, crease: float) -> TriangleMesh:
         from optisense.geometry.shading_normals import smooth_corners
 
-        vertex, faces, normals = smooth_corners(self, crease)
+        vertex, faces, normals = smooth_corners(self)
         return TriangleMesh(self.vertices[vertex], faces, normals)
 
 

@@ -17,19 +17,23 @@ from optisense.array_types import FloatArray
 if TYPE_CHECKING:
     from optisense.geometry.mesh import TriangleMesh
 
+CREASE = 40.0
+"""Angle (degrees) between faces above which an edge always stays sharp in shading: most edges of
+machined parts are at 45 degrees and more, and facets of curved surfaces at a few degrees. Below it,
+creases between flat faces are sharp; see `_creases`."""
+
 SAME_NORMAL = 1e-6
 """Difference between the components of unit normals below which corners of a vertex share it: far
 above the rounding of double precision, and an angle of 6e-5 degrees."""
 
 
 def smooth_corners(
-    mesh: TriangleMesh, crease: float
+    mesh: TriangleMesh,
 ) -> tuple[NDArray[np.integer], NDArray[np.int32], FloatArray]:
     """Compute corner normals, and split the vertices whose corners disagree.
 
     Args:
         mesh: the mesh; its own shading normals are not used.
-        crease: angle (degrees) above which faces around a vertex are not averaged.
 
     Returns:
         The old number (k,) of each new vertex, faces (m, 3) int32 of the new vertices, and their
@@ -47,7 +51,7 @@ def smooth_corners(
     # This is the usual case, and needs no test of pairs.
     lowest = np.full(count, np.inf)
     np.minimum.at(lowest, vertex, np.einsum("ij,ij->i", mean[vertex], normal))
-    plain = (lowest >= np.cos(np.radians(crease / 2))) & np.isfinite(lowest)
+    plain = (lowest >= np.cos(np.radians(CREASE / 2))) & np.isfinite(lowest)
 
     new = np.full(count, -1, dtype=np.int64)
     kept = np.flatnonzero(plain)
@@ -56,7 +60,7 @@ def smooth_corners(
     others = np.flatnonzero(corner < 0)
     if not len(others):
         return source[kept], corner.reshape(-1, 3).astype(np.int32), mean[kept]
-    split = _averaged(vertex[others], weighted[others], normal[others], crease)
+    split = _averaged(vertex[others], weighted[others], normal[others])
     key = np.column_stack([vertex[others], np.round(split / SAME_NORMAL).astype(np.int64)])
     _, first, inverse = np.unique(key, axis=0, return_index=True, return_inverse=True)
     corner[others] = len(kept) + inverse.reshape(-1)
@@ -67,9 +71,7 @@ def smooth_corners(
     )
 
 
-def _averaged(
-    vertex: NDArray[np.integer], weighted: FloatArray, normal: FloatArray, crease: float
-) -> FloatArray:
+def _averaged(vertex: NDArray[np.integer], weighted: FloatArray, normal: FloatArray) -> FloatArray:
     """Return each corner's mean normal (c, 3) over its vertex's corners within the crease angle."""
     from scipy import sparse  # takes a tenth of a second to load
 
@@ -80,7 +82,7 @@ def _averaged(
     )
     pairs = (incidence @ incidence.T).tocoo()
     agree = np.einsum("ij,ij->i", normal[pairs.row], normal[pairs.col])
-    near = (agree >= np.cos(np.radians(crease))) | (pairs.row == pairs.col)
+    near = (agree >= np.cos(np.radians(CREASE))) | (pairs.row == pairs.col)
     join = sparse.csr_matrix(
         (np.ones(int(near.sum())), (pairs.row[near], pairs.col[near])), shape=(count, count)
     )

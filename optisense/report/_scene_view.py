@@ -13,13 +13,9 @@ from optisense.design.colour import ROLE_LOOKS
 from optisense.design.projection import directions
 from optisense.errors import OptiSenseError
 from optisense.geometry import TriangleMesh
+from optisense.geometry.shading_normals import CREASE
 from optisense.report._pictures import encoded
 from optisense.report.camera_rays import CameraRays
-
-CREASE = 35.0
-"""Angle between faces, degrees, from which on their edge is drawn and not shaded smoothly: a
-cylinder of eleven faces or more is smooth.
-"""
 
 MAX_TRIANGLES = 400_000
 """Largest number of triangles of a part in a page; a browser would stall on more."""
@@ -71,7 +67,7 @@ def _part(name: str, role: str, mesh: TriangleMesh) -> dict[str, Any] | None:
     if len(mesh.faces) > MAX_TRIANGLES:
         return None
     colour, alpha = ROLE_LOOKS.get(role, ("#999999", 1.0))
-    smooth = mesh if mesh.normals is not None else mesh.vertex_normals(CREASE)
+    smooth = mesh if mesh.normals is not None else mesh.vertex_normals()
     normals = smooth.normals
     assert normals is not None
     return {
@@ -82,7 +78,7 @@ def _part(name: str, role: str, mesh: TriangleMesh) -> dict[str, Any] | None:
         "points": encoded(smooth.vertices, np.float32),
         "normals": encoded(np.round(normals * 127), np.int8),
         "faces": encoded(smooth.faces, np.uint32),
-        "edges": encoded(feature_edges(mesh, CREASE), np.float32),
+        "edges": encoded(feature_edges(mesh), np.float32),
     }
 
 
@@ -144,13 +140,12 @@ def _rounded(values: Any) -> list[float]:
     return [round(float(value), 4) for value in values]
 
 
-def feature_edges(mesh: TriangleMesh, crease: float) -> NDArray[np.float64]:
-    """Return edges between faces that meet at more than `crease` degrees, and edges of one face
-    only.
+def feature_edges(mesh: TriangleMesh) -> NDArray[np.float64]:
+    """Return edges between faces that meet at more than `CREASE`, which are always sharp in
+    shading, and edges of one face only.
 
     Args:
         mesh: any mesh; coincident vertices count as one.
-        crease: smallest angle between the two faces' normals, degrees.
 
     Returns:
         End points (k, 2, 3), mm.
@@ -167,6 +162,6 @@ def feature_edges(mesh: TriangleMesh, crease: float) -> NDArray[np.float64]:
     second = order[np.minimum(starts + 1, len(order) - 1)] // 3
     normals = welded.face_normals
     cosine = np.einsum("ij,ij->i", normals[first], normals[second])
-    is_sharp = (counts != 2) | (cosine < np.cos(np.radians(crease)))
+    is_sharp = (counts != 2) | (cosine < np.cos(np.radians(CREASE)))
     sharp = unique[is_sharp]
     return welded.vertices[np.column_stack([sharp // count, sharp % count])]

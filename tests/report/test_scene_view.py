@@ -17,13 +17,13 @@ def decoded(text: str, dtype: str) -> np.ndarray:
 
 
 def test_a_box_has_twelve_edges_however_it_is_cut() -> None:
-    edges = feature_edges(TriangleMesh.box((0, 0, 0), (3, 2, 1), (4, 3, 2)), crease=35.0)
+    edges = feature_edges(TriangleMesh.box((0, 0, 0), (3, 2, 1), (4, 3, 2)))
     lengths = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
     assert lengths.sum() == pytest.approx(4 * (3 + 2 + 1))
 
 
 def test_an_open_sheet_shows_its_border_only() -> None:
-    edges = feature_edges(TriangleMesh.grid((3, 2), (5, 5)), crease=35.0)
+    edges = feature_edges(TriangleMesh.grid((3, 2), (5, 5)))
     lengths = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
     assert lengths.sum() == pytest.approx(10)
 

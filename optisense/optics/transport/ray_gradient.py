@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from optisense.array_types import FloatArray
 from optisense.errors import NoDerivativeError
 from optisense.geometry import TriangleMesh
-from optisense.geometry.mesh import CREASE
 from optisense.geometry.shading_normals import smooth_corners
 from optisense.optics.backend.arrays import floats, indices
 from optisense.optics.camera.projection import Pose, RayCamera
@@ -310,7 +309,7 @@ class _Sheet:
 
     @classmethod
     def of(cls, mesh: TriangleMesh) -> _Sheet:
-        source, faces, normals = smooth_corners(mesh, CREASE)
+        source, faces, normals = smooth_corners(mesh)
         smooth = TriangleMesh(mesh.vertices[source], faces, normals)
         return cls(smooth, source, len(mesh.vertices))
 
