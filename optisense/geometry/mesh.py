@@ -192,14 +192,14 @@ class TriangleMesh:
     @cached_property
     def edges(self) -> tuple[IntArray, NDArray[np.int64]]:
         """The edges (n, 2) by their vertices, ascending, and the number (n,) of faces of each."""
-        sides, order = self.sorted_sides
+        sides, order = self._sorted_sides
         ascending = sides[order]
         first = np.flatnonzero(np.diff(ascending, prepend=-1))
         ends = np.divmod(ascending[first], len(self.vertices))
         return np.column_stack(ends).astype(np.int32), np.diff(first, append=len(ascending))
 
     @cached_property
-    def sorted_sides(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def _sorted_sides(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """A number (3 m,) for the side after each corner of the faces, the lower of its vertices
         times n plus the higher one, and the order (3 m,) of these numbers.
         """
@@ -314,13 +314,13 @@ class TriangleMesh:
         return TriangleMesh(self.vertices, self.faces)
 
     @cached_property
-    def divided(self) -> tuple[NDArray[np.integer], NDArray[np.integer]]:
+    def _divided(self) -> tuple[NDArray[np.integer], NDArray[np.integer]]:
         """Faces (m, 3) whose vertices are divided along creases, and the number (k,) in `vertices`
         of each of these.
         """
         from optisense.geometry._creases import divided_at_creases
 
-        return divided_at_creases(self) if self.rest is None else self.rest.divided
+        return divided_at_creases(self) if self.rest is None else self.rest._divided
 
     @cached_property
     def _smooth(self) -> TriangleMesh:

@@ -68,13 +68,13 @@ def sides_of_faces(mesh: TriangleMesh) -> tuple[NDArray[np.int64], NDArray[np.in
     """Return the vertices (3 m, 2) of the sides of all faces, in an order in which the sides of
     faces that share an edge are successive, and the face (3 m,) of each.
     """
-    sides, order = mesh.sorted_sides
+    sides, order = mesh._sorted_sides
     return np.column_stack(np.divmod(sides[order], len(mesh.vertices))), order // 3
 
 
 def inner_edges(mesh: TriangleMesh) -> tuple[NDArray[np.int64], Faces]:
     """Return the vertices (k, 2) of the edges between two faces, and these faces (k, 2)."""
-    sides, order = mesh.sorted_sides
+    sides, order = mesh._sorted_sides
     twin = np.flatnonzero(np.diff(sides[order]) == 0)
     one, other = order[twin], order[twin + 1]
     edges = np.divmod(sides[one], len(mesh.vertices))

@@ -39,7 +39,7 @@ def smooth_corners(
         The old number (k,) of each new vertex, faces (m, 3) int32 of the new vertices, and their
         unit normals (k, 3).
     """
-    faces, source = mesh.divided
+    faces, source = mesh._divided
     vertex = faces.reshape(-1)
     count = len(source)
     normal = np.repeat(mesh.face_normals, 3, axis=0)
