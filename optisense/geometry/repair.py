@@ -113,19 +113,6 @@ def narrow_openings(mesh: TriangleMesh) -> str | None:
     return _told(mesh, found) if found else None
 
 
-def without_holes(mesh: TriangleMesh) -> TriangleMesh:
-    """Return an open mesh whose openings, but for the widest, are closed by faces that meet in the
-    middle of each; their winding is arbitrary.
-    """
-    openings = sorted(_openings(mesh), key=lambda edges: _width(mesh.vertices[edges]))
-    vertices, faces = mesh.vertices, [mesh.faces]
-    for edges in openings[:-1]:
-        middle = np.full((len(edges), 1), len(vertices), dtype=mesh.faces.dtype)
-        faces.append(np.hstack([edges, middle]))
-        vertices = np.vstack([vertices, mesh.vertices[np.unique(edges)].mean(axis=0)])
-    return TriangleMesh(vertices, np.concatenate(faces))
-
-
 def outward(mesh: TriangleMesh) -> TriangleMesh:
     """Return a closed mesh, whose faces agree with their neighbours, with bodies that look outward.
 

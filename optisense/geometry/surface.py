@@ -17,10 +17,6 @@ _ARRIVED = 1e-9
 """Remaining distance (mm) below which a walk over the surface has arrived: far above the rounding
 of double precision (1e-14 mm)."""
 
-_AFAR = 1e6
-"""Length (mm) of a walk that ends at the edge of any surface, whose remaining part is known to
-1e-10 mm."""
-
 KEPT_POINTS = 256
 """Number of places that a surface keeps with their coordinates: a press asks for the same place
 several times, and the walk to it takes some milliseconds on a curved surface."""
@@ -144,7 +140,7 @@ class SensingSurface:
         way = u * self.u_axis + v * self.v_axis
         length = float(np.hypot(u, v))
         if length == 0.0:
-            return self._surface_point(self._origin_face, self.origin)
+            return _smooth_place(self.mesh, self._origin_face, self.origin)
         face, point, left = self._walk(self._origin_face, self.origin, way / length, length)
         if left > _ARRIVED:
             raise ContactError(
@@ -152,34 +148,16 @@ class SensingSurface:
                 f"{length - left:.2f} mm from its middle in that direction",
                 hint="Choose a place nearer to the middle",
             )
-        return self._surface_point(face, point)
-
-    def distance_to_edge(self, u: float, v: float) -> float:
-        """Return the distance (mm) along the surface from the origin to the edge of the surface in
-        the direction (u, v).
-
-        Raises:
-            MeshError: there is no edge in this direction.
-        """
-        way = (u * self.u_axis + v * self.v_axis) / np.hypot(u, v)
-        return _AFAR - self._walk(self._origin_face, self.origin, way, _AFAR)[2]
+        return _smooth_place(self.mesh, face, point)
 
     def nearest(self, point: ArrayLike) -> SurfacePoint:
         """Return the place nearest to `point` (3,), mm."""
-        return self._surface_point(*closest_place(self.mesh, point))
+        return nearest_place(self.mesh, point)
 
     def height_above(self, place: SurfacePoint) -> float:
         """Return the largest height (mm) of the surface, outward, over its tangent plane."""
         outward = (self.mesh.vertices - place.point) @ -place.inward
         return max(0.0, float(outward.max()))
-
-    def _surface_point(self, face: int, point: FloatArray) -> SurfacePoint:
-        """Return the place with the smooth normal, which is nearly that of neighbouring places."""
-        smooth = self.mesh.vertex_normals()  # kept by the mesh
-        assert smooth.normals is not None
-        share = _barycentric(self.mesh.triangles[face], point)
-        normal = share @ smooth.normals[smooth.faces[face]]
-        return SurfacePoint(point, normal / np.linalg.norm(normal))
 
     @cached_property
     def _neighbours(self) -> dict[tuple[int, int], list[int]]:
@@ -235,6 +213,20 @@ class SensingSurface:
         along = float(direction @ edge)
         turned: FloatArray = along * edge + np.sqrt(max(0.0, 1.0 - along * along)) * into
         return turned
+
+
+def nearest_place(mesh: TriangleMesh, point: ArrayLike) -> SurfacePoint:
+    """Return the place on a welded mesh that is nearest to `point` (3,), mm."""
+    return _smooth_place(mesh, *closest_place(mesh, point))
+
+
+def _smooth_place(mesh: TriangleMesh, face: int, point: FloatArray) -> SurfacePoint:
+    """Return the place with the smooth normal, which is nearly that of neighbouring places."""
+    smooth = mesh.vertex_normals()  # kept by the mesh
+    assert smooth.normals is not None
+    share = _barycentric(mesh.triangles[face], point)
+    normal = share @ smooth.normals[smooth.faces[face]]
+    return SurfacePoint(point, normal / np.linalg.norm(normal))
 
 
 def _barycentric(triangle: FloatArray, point: FloatArray) -> FloatArray:

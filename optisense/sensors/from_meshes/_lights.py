@@ -9,10 +9,11 @@ from optisense.array_types import FloatArray
 from optisense.design import Light
 from optisense.design.limits import refuse_far
 from optisense.design.posing import triple
-from optisense.errors import ContactError, DesignError
-from optisense.geometry import SensingSurface, TriangleMesh, ray_hits
+from optisense.errors import DesignError
+from optisense.geometry import TriangleMesh
 from optisense.geometry.patches import Faces, mean_normal, middle
-from optisense.geometry.repair import without_holes
+from optisense.geometry.surface import nearest_place
+from optisense.sensors.from_meshes._board_section import BoardSection
 from optisense.sensors.from_meshes.directions import Direction, axis_of, radial_vector, vector
 from optisense.sensors.from_meshes.recipe_lights import LightRow, LightsOver, Ring
 
@@ -96,7 +97,8 @@ def over(choice: LightsOver, mesh: TriangleMesh, patches: list[Faces], where: st
     without one the available length, measured along the surface.
 
     Raises:
-        DesignError: lights fall off the surface, or its normals point in all directions.
+        DesignError: lights fall off the surface or in a hole, its normals point in all directions,
+            or a row has no ends.
     """
     if choice.count is None:
         groups = patches if choice.patches != "largest" else patches[:1]
@@ -154,12 +156,7 @@ def _grid(
     height = (points - centre) @ normal
     if np.ptp(height) > FLAT:
         part = mesh.with_faces(mesh.faces[patch]).compacted().welded()
-        whole = without_holes(part)
-        place = _in_front(whole, centre, normal)
-        if place is None:
-            raise _off(where, 0.0, 0.0)
-        real, surface = (SensingSurface(each, place, along, across) for each in (part, whole))
-        return _on_curve(real, surface, count, pitch, where)
+        return _on_curve(part, (along, across, normal, centre), count, pitch, where)
     columns, rows = evenly(count[0], pitch[0], size[0]), evenly(count[1], pitch[1], size[1])
     flat = shapely.union_all(
         shapely.polygons(
@@ -176,44 +173,50 @@ def _grid(
     return spots
 
 
-def _in_front(mesh: TriangleMesh, centre: FloatArray, normal: FloatArray) -> FloatArray | None:
-    """Return the point (3,) of a surface on the line through `centre` along its normal, mm: that
-    nearest to `centre`, or None in a hole.
-    """
-    back = float(np.linalg.norm(np.ptp(mesh.bounds, axis=0)))
-    heights = ray_hits(mesh, centre - back * normal, normal).distance - back
-    if not len(heights):
-        return None
-    return np.asarray(centre + heights[np.abs(heights).argmin()] * normal)
-
-
 def _on_curve(
-    real: SensingSurface,
-    surface: SensingSurface,
+    board: TriangleMesh,
+    frame: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
     count: tuple[int, int],
     pitch: tuple[float | None, float | None],
     where: str,
 ) -> list[tuple[FloatArray, FloatArray]]:
-    """Return lights as on a flat surface, but with distances measured along the surface, which is
-    the real one with its holes closed.
-    """
+    """Return lights as on a flat surface, but with distances measured along the surface: from its
+    middle along the row through it, and from there across.
 
-    def places(number: int) -> FloatArray:
+    Args:
+        frame: unit vectors (3,) along and across the board and along its normal, and the middle
+            (3,) of its outline, mm.
+    """
+    along, across, normal, centre = frame
+
+    def section(origin: FloatArray, way: FloatArray, up: FloatArray, u: float) -> BoardSection:
+        found = BoardSection.of(board, origin, way, up)
+        if found is None:
+            raise _off(where, u, 0.0)
+        return found
+
+    def column(u: float) -> BoardSection:
+        foot = lengthwise.at(u)
+        if foot is None:
+            raise _off(where, u, 0.0)
+        return section(foot.point, across, foot.normal, u)
+
+    def places(number: int, line: BoardSection) -> FloatArray:
         if pitch[number] is not None:
             return evenly(count[number], pitch[number], 0.0)
-        u, v = np.eye(2)[number].tolist()
-        before, after = surface.distance_to_edge(-u, -v), surface.distance_to_edge(u, v)
-        return evenly(count[number], None, before + after) + 0.5 * (after - before)
+        first, last = line.distances[[0, -1]]
+        return evenly(count[number], None, last - first) + 0.5 * (first + last)
 
-    columns, rows = places(0), places(1)
+    lengthwise = section(centre, along, normal, 0.0)
+    rows = places(1, column(0.0)).tolist()
+    columns = {u: column(u) for u in places(0, lengthwise).tolist()}
     spots = []
     for v in rows:
-        for u in columns:
-            try:
-                spot = surface.point_at(float(u), float(v))
-            except ContactError:
-                raise _off(where, u, v) from None
-            found = real.nearest(spot.point)
+        for u, line in columns.items():
+            spot = line.at(v)
+            if spot is None:
+                raise _off(where, u, v)
+            found = nearest_place(board, spot.point)
             if np.linalg.norm(found.point - spot.point) > FLAT:
                 raise _off(where, u, v)
             spots.append((found.point, found.inward))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -114,24 +115,58 @@ class TestOver:
         found = np.degrees(np.arctan2(places(lights)[:, 1], -places(lights)[:, 2]))
         np.testing.assert_allclose(np.sort(found), angles, atol=0.2)
 
-    def test_holes_of_a_curved_board_do_not_end_it(self) -> None:
-        """In a half pipe without two cells, beside the row of lights or under one."""
+    @staticmethod
+    def half_pipe(hole: Callable[[Any, Any], Any]) -> TriangleMesh:
+        """A half pipe of radius 10 mm in 16 x 24 cells, without those where `hole` is true of x and
+        the angle in degrees.
+        """
         turn = np.radians(np.linspace(-90.0, 90.0, 25))
         arc = np.stack([np.zeros(25), 10.0 * np.sin(turn), -10.0 * np.cos(turn)], axis=1)
-        vertices = np.concatenate([arc + (x, 0.0, 0.0) for x in (-8.0, -1.0, 1.0, 8.0)])
-        pipe = TriangleMesh(vertices, grid_faces(4, 25))
-        angles = np.degrees(np.arctan2(pipe.triangles.mean(1)[:, 1], -pipe.triangles.mean(1)[:, 2]))
-        middle = np.abs(pipe.triangles.mean(1)[:, 0]) < 1.0
-        choice = {"count": [4, 1], "within": 88}
+        vertices = np.concatenate([arc + (x, 0.0, 0.0) for x in np.linspace(-8.0, 8.0, 17)])
+        faces = grid_faces(17, 25)
+        corners = vertices[faces].reshape(2, -1, 3, 3)  # two triangles of each cell
+        x, y, z = np.moveaxis(corners.mean(axis=(0, 2)), 1, 0)
+        return TriangleMesh(vertices, faces[~np.tile(hole(x, np.degrees(np.arctan2(y, -z))), 2)])
 
-        def holed(low: float, high: float) -> TriangleMesh:
-            return pipe.with_faces(pipe.faces[~(middle & (angles > low) & (angles < high))])
+    @pytest.mark.parametrize(
+        ("hole", "angles"),
+        [
+            (lambda x, angle: (abs(x) < 1) & (abs(angle) < 7.5), [-67.5, -22.5, 22.5, 67.5]),
+            (lambda x, angle: (abs(x) < 1) & (abs(angle) < 37.5), [-45.0, 45.0]),
+            (
+                lambda x, angle: (
+                    (abs(x) < 1) & (abs(angle) < 15) | (abs(x - 2) < 2) & (abs(angle - 4) < 4)
+                ),
+                [-67.5, -22.5, 22.5, 67.5],
+            ),
+        ],
+        ids=["square", "slot", "L"],
+    )
+    def test_a_hole_of_a_curved_board_does_not_move_its_row(
+        self, hole: Callable[[Any, Any], Any], angles: list[float]
+    ) -> None:
+        lights = self.spots(self.half_pipe(hole), count=[len(angles), 1], within=88)
+        x, y, z = places(lights).T
+        np.testing.assert_allclose(np.sort(np.degrees(np.arctan2(y, -z))), angles, atol=0.4)
+        np.testing.assert_allclose(x, 0.0, atol=1e-6)
 
-        lights = self.spots(holed(-7.5, 7.5), **choice)
-        found = np.sort(np.degrees(np.arctan2(places(lights)[:, 1], -places(lights)[:, 2])))
-        np.testing.assert_allclose(found, [-67.5, -22.5, 22.5, 67.5], atol=0.5)
+    def test_a_light_in_a_hole_of_a_curved_board_is_refused(self) -> None:
+        board = self.half_pipe(lambda x, angle: (abs(x) < 1) & (angle > 15) & (angle < 30))
         with pytest.raises(DesignError, match="off it, or in a hole"):
-            self.spots(holed(15.0, 30.0), **choice)
+            self.spots(board, count=[4, 1], within=88)
+
+    def test_a_row_over_several_curved_pieces(self) -> None:
+        """As over flat ones, it is spread over all of them."""
+        pieces = self.half_pipe(lambda x, angle: (abs(angle) > 45) | (abs(abs(x) - 2) < 1))
+        lights = self.spots(pieces, count=[2, 1], within=88, patches="all")
+        np.testing.assert_allclose(places(lights)[:, :2], [[-4.0, 0.0], [4.0, 0.0]], atol=1e-6)
+
+    def test_a_row_around_a_body_is_refused(self) -> None:
+        body = TriangleMesh.box((-3, -2, -2), (3, 2, 2))
+        above = TriangleMesh.grid((20.0, 20.0), (2, 2))
+        both = TriangleMesh.joined([body, TriangleMesh(above.vertices + (0, 0, 5), above.faces)])
+        with pytest.raises(DesignError, match="no edge at the ends of a row"):
+            self.spots(both, count=3, within=180, patches="all")
 
     def test_a_surface_that_looks_everywhere_is_refused(self) -> None:
         shape = LightsOver(file="b.stl", count=3)
