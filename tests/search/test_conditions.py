@@ -20,8 +20,11 @@ from optisense.search import SearchResult, SearchSpace, Study, search
 from optisense.search.evaluation.evaluator import DesignEvaluator
 from optisense.search.evaluation.outcome import FAILED, Outcome, rank_of
 from optisense.search.evaluation.requirements import Requirement, requirements_of
+from optisense.search.evaluation.robust import RobustEvaluator
 from optisense.search.methods.base import values_to_maximise
 from optisense.search.methods.dominance import dominates, ranks
+from optisense.search.space.manufacturing import ManufacturingErrors
+from optisense.search.study._tally import ALL_FAIL, Tally
 from optisense.search.study.best import best_of, nearest
 from optisense.search.study.conditions import (
     condition_lines,
@@ -33,6 +36,7 @@ from optisense.search.study.conditions import (
 )
 from optisense.search.study.progress import SearchProgress
 from optisense.search.study.settings import LATER, StudySettings
+from optisense.search.study.store import START, Row
 from optisense.search.study.trial import Trial
 
 RAYS: dict[str, Any] = {"ray_resolution": (64, 48)}
@@ -273,6 +277,30 @@ def test_nine_of_ten_manufactured_sensors_meet_a_condition(mini: SensorDesign) -
     made = robust.best.conditions[limit]
     exact = plain.best.conditions[limit]
     assert made is not None and exact is not None and made >= 0.5 and exact >= 0.5
+
+
+def test_a_condition_without_a_value_on_manufactured_sensors_has_a_reason(
+    mini: SensorDesign,
+) -> None:
+    with forgetting():
+
+        @objective("mute", rays_only=True)
+        def mute(evaluation: Evaluation) -> float:
+            raise SearchError("nothing is in view")
+
+        space = SearchSpace({"camera.fov": (40.0, 60.0)}).bind(mini)
+        usual = DesignEvaluator(space, [lambda each: each.camera.fov], requirements=["mute >= 0"])
+        errors = ManufacturingErrors({"coating.reflectance.r": 0.01})
+        found = RobustEvaluator(usual, errors, seed=0, samples=3)(space.start, 0)
+    assert found.unmeasured == ["mute >= 0"]
+    reason = "3 of 3 manufactured sensors fail: mute: nothing is in view"
+    assert found.failure is not None and found.failure.startswith(reason)
+    tally = Tally(usual.names)
+    tally.count(Row(0, START, 0, space.start, found, None), found)
+    with pytest.raises(SearchError, match=f"all {ALL_FAIL} trials .* because: {reason}"):
+        for number in range(1, ALL_FAIL + 1):
+            tally.count(Row(number, 0, 0, space.start, found, None), found)
+    assert tally.failed == 0
 
 
 def test_a_score_won_by_seeing_less_is_told(mini: SensorDesign) -> None:

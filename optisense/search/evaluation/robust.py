@@ -86,7 +86,7 @@ class RobustEvaluator:
                 str(each): json_ready(_reached(each, found)) for each in self.usual.requirements
             }
         failure = None
-        if any(math.isnan(value) for value in scores.values()):
+        if Outcome(scores, parts=parts).unmeasured:
             reasons = [outcome.failure for outcome in found if outcome.failure]
             failure = f"{len(reasons)} of {len(found)} manufactured sensors fail: {reasons[0]}"
         return Outcome(scores, failure, parts, time.perf_counter() - began)

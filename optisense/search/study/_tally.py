@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from optisense.errors import SearchError
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.study.conditions import unmet, worsened
-from optisense.search.study.failures import cause_of, is_defect, is_of_rule
+from optisense.search.study.failures import cause_of, is_defect, is_of_rule, reason_of
 from optisense.search.study.store import START, Row
 
 ALL_FAIL = 20
@@ -61,7 +61,7 @@ class Tally:
             self.broken += not failed and not outcome.is_feasible
             if outcome.lacking(self._weighed) or None in outcome.conditions.values():
                 self._useless += 1
-                reason = outcome.failure or "there is no score"
+                reason = reason_of(outcome)
                 self._reasons.setdefault(cause_of(reason), []).append(reason)
         if not failed:
             self.scored[row.vector.tobytes()] = outcome

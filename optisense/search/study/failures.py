@@ -15,6 +15,7 @@ from optisense.objectives.scoring import RETURNED
 from optisense.search.space.constraints import RULE
 
 if TYPE_CHECKING:
+    from optisense.search.evaluation.outcome import Outcome
     from optisense.search.study.trial import Trial
 
 FAILED = "failed"
@@ -60,6 +61,13 @@ def is_of_rule(reason: str) -> bool:
     return _OF_RULE.match(reason) is not None
 
 
+def reason_of(outcome: Outcome) -> str:
+    """Return why an outcome lacks a score or another value. The stored outcomes of earlier releases
+    may have no reason for a condition without a value; the text then names what is missing.
+    """
+    return outcome.failure or f"there is no value of {', '.join(outcome.unmeasured)}"
+
+
 def cause_of(reason: str) -> str:
     """Return the cause in a reason: the text without numbers that differ among trials."""
     return _NUMBER.sub("…", _PLACE.sub("", reason))
@@ -99,7 +107,7 @@ def counted(trials: Sequence[Trial]) -> str:
 
 def causes_among(trials: Iterable[Trial]) -> list[FailureCause]:
     """Return the causes why trials have no score or lack a value, the most frequent first."""
-    return by_cause((trial.number, trial.failure or "") for trial in trials)
+    return by_cause((trial.number, reason_of(trial.outcome)) for trial in trials)
 
 
 def incomplete_note(best: Trial | None) -> str | None:
