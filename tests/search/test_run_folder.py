@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import sqlite3
 from dataclasses import replace
@@ -159,6 +160,24 @@ class TestFolder:
         assert "new study with another --out" in str(told.value.hint)
         assert (len(study.trials), study.budget) == (6, 5)
         assert len(run_study(Study.open(folder, goals=[goals.nearness]), limit=10).trials) == 11
+
+    def test_another_definition_is_found_though_a_further_objective_always_fails(
+        self, mini: SensorDesign, goals: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        folder, both = tmp_path / "study", [goals.nearness, goals.broken]
+        search(mini, SPACE, both, budget=2, out=folder).study.close()
+        monkeypatch.setattr("optisense.search.study.loop.SCORING", SCORING + 1)
+        factor = 1.1
+
+        def nearness(design: SensorDesign) -> float:
+            return factor * float(goals.nearness(design))
+
+        with pytest.raises(SearchError, match=r"nearness was .* and is .* now"):
+            run_study(Study.open(folder, goals=[nearness, goals.broken]), limit=3)
+        factor = math.nan
+        with pytest.raises(SearchError, match=r"no value of nearness now: nearness: .* nan"):
+            run_study(Study.open(folder, goals=[nearness, goals.broken]), limit=3)
+        assert len(run_study(Study.open(folder, goals=both), limit=3).trials) == 4
 
     def test_scores_of_other_releases_of_a_package_are_not_mixed(
         self, mini: SensorDesign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -37,11 +37,12 @@ ROUNDING = 1e-9
 
 def refuse_other_definitions(then: Outcome, now: Outcome) -> None:
     """Raise SearchError if one design, scored with one seed by an earlier release and by this one,
-    has different scores or values of limited quantities.
+    has different scores or values of limited quantities, or lacks one now.
     """
     changed = [*_changed(then.scores, now.scores), *_changed(then.conditions, now.conditions)]
-    if now.failed:
-        changed.append(f"its trial fails now: {now.failure}")
+    missing = [name for name in now.unmeasured if name not in then.unmeasured]
+    if missing:
+        changed.append(f"there is no value of {', '.join(missing)} now: {now.failure}")
     if changed:
         raise SearchError(
             "an earlier release scored this study by other definitions: for the same design and "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import reprlib
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -202,11 +203,11 @@ class StudyRun:
         return points
 
     def _check_definitions(self, runner: Runner) -> None:
-        """Score the first finished trial of an earlier release again; SearchError if it scores
-        otherwise.
+        """Score the first trial of an earlier release that has a score again; SearchError if it
+        scores otherwise.
         """
         settings = self.study.settings
-        first = next((trial for trial in self.study.trials if not trial.outcome.failed), None)
+        first = next((trial for trial in self.study.trials if math.isfinite(trial.score)), None)
         if settings.scoring == SCORING or first is None:
             return
         then = first.outcome

@@ -206,7 +206,8 @@ def tolerance(
 
     Raises:
         KeyboardInterrupt: Ctrl-C came before the nominal design had its score.
-        SearchError: an error is invalid, or the nominal design has no score.
+        SearchError: an error is invalid, or the nominal design has no score by one of the
+            objectives.
         DesignError: a path names nothing in the design; the message suggests a similar name.
         ObjectiveError: an objective or a setting is unknown.
     """
