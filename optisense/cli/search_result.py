@@ -30,13 +30,13 @@ screen; all are in the study.
 
 def summary(result: SearchResult) -> dict[str, Any]:
     """Return the result, ready for JSON."""
-    trials = result.trials
+    trials = [trial for trial in result.trials if not trial.is_start]
     best = result.study.best
     start = result.study.start
     scored = [trial for trial in trials if math.isfinite(trial.score)]
     return {
         "study": str(result.study.folder),
-        "trials": sum(not trial.is_start for trial in trials),
+        "trials": len(trials),
         "failed": len(trials) - len(scored),
         "interrupted": result.interrupted,
         "ended": result.ended,
@@ -163,7 +163,7 @@ def _failures(kind: str, trials: Sequence[Trial]) -> str:
 
     causes = causes_among(trials)
     lines = [f"{counted(trials)} {kind}:"]
-    lines += [f"  {len(each.numbers)}  {each.text}" for each in causes[:MOST_CAUSES]]
+    lines += [f"  {counted(each.trials)}: {each.text}" for each in causes[:MOST_CAUSES]]
     if len(causes) > MOST_CAUSES:
         lines.append(f"  and {len(causes) - MOST_CAUSES} more causes")
     return "\n".join(lines)

@@ -13,7 +13,7 @@ import numpy as np
 from optisense.report.before_after import RayFigures
 from optisense.search.evaluation.outcome import rank_of
 from optisense.search.study.conditions import condition_results, is_worse
-from optisense.search.study.failures import FAILED, causes_among, incomplete
+from optisense.search.study.failures import FAILED, causes_among, counted, incomplete
 from optisense.search.study.study import Study, beside
 from optisense.search.study.trial import Trial
 
@@ -208,11 +208,11 @@ def failures(found: Sequence[Trial]) -> list[tuple[str, Table, int]]:
     for kind, members in incomplete(found).items():
         causes = causes_among(members)
         rows = [
-            [each.text, str(len(each.numbers)), f"trial {each.numbers[0]}: {each.example}"]
+            [each.text, counted(each.trials), f"trial {each.trials[0].number}: {each.example}"]
             for each in causes[:MOST_CAUSES]
         ]
         heading = "Failed trials" if kind == FAILED else f"Trials {kind}"
-        table = Table(["cause", "trials", "such as"], rows)
+        table = Table(["cause", "number", "such as"], rows)
         tables.append((heading, table, max(0, len(causes) - MOST_CAUSES)))
     return tables
 

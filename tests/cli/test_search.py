@@ -29,6 +29,11 @@ def near(evaluation):
         os.kill(os.getpid(), signal.SIGINT)
     return -((design.coating.specularity - 0.3) ** 2)
 
+def picky(design):
+    if design.coating.specularity in (0.0, 0.2):
+        raise RuntimeError("it is too dull")
+    return 1.0
+
 def shy(evaluation):
     raise RuntimeError("I have nothing to say")
 
@@ -55,7 +60,7 @@ def study(mine: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert "11 trials: the method has finished" in result.output
     assert "best: trial 4, near 0 (start -0.09)" in result.output
     assert "coating.specularity = 0.3" in result.output
-    assert "6 trials failed:\n  6  too shiny" in result.output
+    assert "6 trials failed:\n  6 trials: too shiny" in result.output
     assert f"optisense apply {folder} --trial best" in result.output
     return folder
 
@@ -145,6 +150,14 @@ def test_json(study: Path) -> None:
     assert found["best"]["values"] == {"coating.specularity": pytest.approx(0.3)}
     assert found["start"]["scores"]["near"] == pytest.approx(-0.09)
     assert not found["interrupted"]
+
+
+def test_json_counts_the_start_nowhere(mine: Path, tmp_path: Path) -> None:
+    result = run("gelsight-mini-ideal", "--vary", "coating.specularity=0.2:0.3:2", "--method",
+                 "grid", "-b", f"{mine}:picky", "--out", tmp_path / "study", "--json")  # fmt: skip
+    found = json.loads(result.stdout)
+    assert found["start"]["scores"] == {"picky": None}
+    assert (found["trials"], found["failed"], found["broken"]) == (2, 1, 0)
 
 
 def test_commands_can_be_copied_to_a_shell(study: Path, tmp_path: Path) -> None:
@@ -268,12 +281,14 @@ def test_trials_without_a_further_value_have_not_failed(mine: Path, tmp_path: Pa
                  f"{mine}:near", "-b", f"{mine}:shy", "--method", "grid",
                  "--out", study)  # fmt: skip
     assert result.exit_code == 0, result.output
-    assert "2 trials and the start without a value of shy:\n  3  shy: Run" in result.output
+    lacking = "2 trials and the start"
+    assert f"{lacking} without a value of shy:\n  {lacking}: shy: Run" in result.output
     assert "  shy failed" in result.output
     assert "trials failed" not in result.output
     with closing(Study.open(study)) as opened:
         page = render_study(opened)
-    assert '<span class="soft">without a value of shy</span> <b>2 trials and the start</b>' in page
+    assert f'<span class="soft">without a value of shy</span> <b>{lacking}</b>' in page
+    assert f'<td class="tight">{lacking}</td>' in page
     assert "Trials without a value of shy, by cause" in page
     assert "Trial 2 is the best by near, the first objective, but another" in page
 

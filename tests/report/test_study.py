@@ -20,6 +20,7 @@ from optisense.report.before_after import DesignView, RayFigures
 from optisense.report.study import render_study, write_study_report
 from optisense.report.trial_pictures import Ball
 from optisense.search import Around, CagePoints, SearchResult, Study, search
+from optisense.search.study.failures import counted
 
 EVIL = "</table><img src=x onerror=alert(1)>"
 SPACE: dict[str, object] = {
@@ -84,7 +85,7 @@ def test_trials_and_failures_are_listed(result: SearchResult, page: str) -> None
     for trial in result.trials:
         if trial.failure is None:
             assert f">{trial.scores['steep']:.4g}<" in page
-    assert f'<td class="tight">{len(failed)}</td>' in page
+    assert f'<td class="tight">{counted(failed)}</td>' in page
     assert f"trial {failed[0].number}: " in page
     shown = len(result.trials) - len(failed)
     assert result.trials[0].is_start

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from optisense.search.study.failures import by_cause, cause_of, is_defect
+from optisense.search.evaluation.outcome import Outcome
+from optisense.search.space.search_space import BoundSpace
+from optisense.search.study.failures import cause_of, causes_among, is_defect
+from optisense.search.study.trial import Trial
 
 CROSSING = "parts '{}' and '{}' cut through each other at ({}, 11.51, 86.87) mm"
 
 
-def test_the_same_parts_are_one_cause_wherever_they_meet() -> None:
-    found = by_cause(
-        [
-            (3, CROSSING.format("M1", "body", "-3.76")),
-            (7, CROSSING.format("M2", "body", "1.20")),
-            (8, CROSSING.format("M1", "body", "16.32")),
-        ]
+def test_the_same_parts_are_one_cause_wherever_they_meet(two_numbers: BoundSpace) -> None:
+    places = (("M1", "body", "-3.76"), ("M2", "body", "1.20"), ("M1", "body", "16.32"))
+    failed = [Outcome.of_failure(["near"], CROSSING.format(*place)) for place in places]
+    found = causes_among(
+        Trial(number, 0, two_numbers.start, outcome, two_numbers)
+        for number, outcome in zip((3, 7, 8), failed, strict=True)
     )
-    assert [cause.numbers for cause in found] == [[3, 8], [7]]
+    assert [[each.number for each in cause.trials] for cause in found] == [[3, 8], [7]]
     assert found[0].text == "parts 'M1' and 'body' cut through each other"
     assert found[0].example == CROSSING.format("M1", "body", "-3.76")
 

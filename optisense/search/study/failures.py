@@ -43,12 +43,12 @@ class FailureCause:
     Attributes:
         text: reason without coordinates; other numbers are replaced by an ellipsis.
         example: first reason of this kind, in full.
-        numbers: numbers of the items that failed for this cause, in their order.
+        trials: trials that failed for this cause, in their order.
     """
 
     text: str
     example: str
-    numbers: list[int] = field(default_factory=list)
+    trials: list[Trial] = field(default_factory=list)
 
 
 def is_defect(reason: str) -> bool:
@@ -73,17 +73,6 @@ def cause_of(reason: str) -> str:
     return _NUMBER.sub("…", _PLACE.sub("", reason))
 
 
-def by_cause(failures: Iterable[tuple[int, str]]) -> list[FailureCause]:
-    """Group failures, numbers of trials and their reasons, by cause, the most
-    frequent cause first.
-    """
-    found: dict[str, FailureCause] = {}
-    for number, reason in failures:
-        text = cause_of(reason)
-        found.setdefault(text, FailureCause(text, reason)).numbers.append(number)
-    return sorted(found.values(), key=lambda cause: -len(cause.numbers))
-
-
 def incomplete(trials: Iterable[Trial]) -> dict[str, list[Trial]]:
     """Return the trials for which a value is missing, by kind: first those without a score
     (`FAILED`), then others, such as "without a value of aoap".
@@ -99,7 +88,9 @@ def incomplete(trials: Iterable[Trial]) -> dict[str, list[Trial]]:
 
 
 def counted(trials: Sequence[Trial]) -> str:
-    """Return the number of trials as text; the start, which is none of a budget, is told apart."""
+    """Return the number of trials as text; the start does not count against the budget and is named
+    separately.
+    """
     number = sum(not trial.is_start for trial in trials)
     parts = [f"{number:,} {'trial' if number == 1 else 'trials'}"] if number else []
     return " and ".join([*parts, *["the start"] * (number < len(trials))])
@@ -107,7 +98,12 @@ def counted(trials: Sequence[Trial]) -> str:
 
 def causes_among(trials: Iterable[Trial]) -> list[FailureCause]:
     """Return the causes why trials have no score or lack a value, the most frequent first."""
-    return by_cause((trial.number, reason_of(trial.outcome)) for trial in trials)
+    found: dict[str, FailureCause] = {}
+    for trial in trials:
+        reason = reason_of(trial.outcome)
+        text = cause_of(reason)
+        found.setdefault(text, FailureCause(text, reason)).trials.append(trial)
+    return sorted(found.values(), key=lambda cause: -len(cause.trials))
 
 
 def incomplete_note(best: Trial | None) -> str | None:
