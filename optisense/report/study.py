@@ -154,7 +154,7 @@ def render_study(
         all_changes=len(changes),
         trials=tables.trials(study, trials, strongest[:MOST_COLUMNS]),
         finished=len(trials),
-        tried=_tried(trials),
+        tried=counted(trials),
         failures=tables.failures(trials),
         settings=tables.settings(study),
         live=live,
@@ -226,13 +226,6 @@ def _headline(study: Study, trials: Sequence[Trial], best: Trial | None) -> list
         by = f" by {study.objective}" if len(settings.names) > 1 else ""
         facts.append((f"best{by}", f"trial {best.number}"))
     return facts
-
-
-def _tried(trials: Sequence[Trial]) -> str:
-    """Return the number of trials as text; the start is none of them, as in the headline."""
-    count = sum(not trial.is_start for trial in trials)
-    text = f"{count:,} trial" if count == 1 else f"{count:,} trials"
-    return text if count == len(trials) else f"{text} and the start"
 
 
 def _unfinished(study: Study, trials: Sequence[Trial]) -> str:
