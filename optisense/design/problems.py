@@ -85,7 +85,7 @@ def design_error(
     The place `where` is a file, with `lines`, or the dotted path that was set; if it is empty, each
     problem has its own dotted path.
     """
-    problems = _problems(error, data, where, lines or {}, model)
+    problems = validation_problems(error, data, where, lines, model)
     unseen = max(error.error_count() - MAX_EXAMINED, 0)
     return _in_one(problems, where or "the design", unseen)
 
@@ -104,7 +104,7 @@ def invalid_values(design: SensorDesign) -> list[Diagnostic]:
         return [Diagnostic(error.message, design.where() or "design", error.hint)]
     except ValidationError as error:
         where = "" if design._source is None else str(design._source)
-        return _problems(error, data, where, design._lines, type(design))
+        return validation_problems(error, data, where, design._lines, type(design))
     return []
 
 
@@ -125,9 +125,15 @@ def kind_problems(design: SensorDesign, before: SensorDesign | None = None) -> l
     return problems
 
 
-def _problems(
-    error: ValidationError, data: Any, where: str, lines: Lines, model: type[BaseModel]
+def validation_problems(
+    error: ValidationError,
+    data: Any,
+    where: str = "",
+    lines: Lines | None = None,
+    model: type[BaseModel] = SensorDesign,
 ) -> list[Diagnostic]:
+    """Return the problems in an error of pydantic, at most `MAX_EXAMINED`; see `design_error`."""
+    lines = lines or {}
     reports = error.errors(include_url=False)[:MAX_EXAMINED]
     found: list[Diagnostic] = []
     explained: set[Steps] = set()  # missing fields that a misspelt one stands for

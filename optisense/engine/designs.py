@@ -14,10 +14,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from optisense.design import SensorDesign, check_design, load_design, set_value
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
-from optisense.design.problems import Diagnostic, design_error
+from optisense.design.problems import Diagnostic, design_error, validation_problems
 from optisense.design.sensor_design import dotted
 from optisense.design.storage import DESIGN_FILE, file_inside
-from optisense.engine.failures import InvalidDesignError, ProtocolError, place_in
+from optisense.engine.failures import InvalidDesignError, ProtocolError
 from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh
 from optisense.library import names
@@ -182,8 +182,8 @@ class Designs:
             design = SensorDesign.model_validate(data)
         except ValidationError as error:
             found = design_error(error, data)
-            where = found.where or place_in(found.message, data.get("parts"))
-            raise DesignError(found.message, where=where, hint=found.hint) from None
+            first = validation_problems(error, data)[0]
+            raise DesignError(found.message, where=first.where, hint=found.hint) from None
         base = None if folder is None else Path(folder)
         for name, part in design.parts.items():
             if name not in elsewhere:

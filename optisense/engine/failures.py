@@ -114,24 +114,6 @@ def path_in(where: str | None) -> str | None:
     return where if found else None
 
 
-def place_in(message: str, parts: object = None) -> str | None:
-    """Return the first dotted path that a message quotes, or the path of the first part that it
-    names.
-
-    Args:
-        parts: parts of the design as JSON; a value of another type counts as no parts.
-    """
-    known = parts if isinstance(parts, dict) else {}
-    for text in re.findall(r"'([^']+)'", message):
-        if "." in text and _PATH.fullmatch(text):
-            return str(text)
-        if text in known:
-            return f"parts.{text}"
-        if text in ("camera", "coating"):
-            return text
-    return None
-
-
 def part_of(
     message: str, path: str | None, known: Sequence[str], design: SensorDesign | None = None
 ) -> str | None:

@@ -67,6 +67,15 @@ def test_places_of_errors_are_dotted_paths_for_folders_too(folder: Path) -> None
         designs.read("mini")
 
 
+def test_two_values_that_do_not_fit_have_the_place_of_the_first() -> None:
+    data = ots.load("gelsight-mini-ideal").model_dump(mode="json")
+    data["camera"]["fov"] = 185.0
+    data["parts"]["gel"]["faces"] = {"back": {"roughness": 0.1}}
+    with pytest.raises(DesignError, match="has 2 problems") as caught:
+        Designs().read(DesignReference(data=data))
+    assert caught.value.where == "parts.gel.faces.back"
+
+
 def test_an_unsound_design_tells_all_that_is_wrong(folder: Path) -> None:
     designs = Designs()
     board = ots.load("gelsight360").meshes["boards"].vertices[:8].mean(axis=0).tolist()
