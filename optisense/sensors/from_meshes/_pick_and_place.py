@@ -39,6 +39,7 @@ LARGEST = 10_000.0
 
 _UNIT = re.compile(r"\b(mm|mils?|inch(?:es)?|in|thou)\b", re.IGNORECASE)
 _NUMBER = re.compile(r"([-+]?\d*\.?\d+(?:[eE][-+]?\d+)?)\s*(mm|mils?|inch|in)?$", re.IGNORECASE)
+_ZERO = re.compile(r"[-+]?0*[.,]?0*(?:e[-+]?\d+)?\s*(?:mm|mils?|inch|in)?$", re.IGNORECASE)
 _ANGLE = re.compile(
     r"([-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:e[-+]?\d+)?)\s*(?:[°º]|deg(?:rees?)?)?$", re.IGNORECASE
 )
@@ -65,8 +66,8 @@ class BoardPart:
 
 
 PartTable = Mapping[str, BoardPart | DesignError]
-"""Parts by designator. If the position of a part is unknown, because its line has no numbers or an
-unknown side, or repeats a designator, there is the error instead, which names the line."""
+"""Parts by designator. If the position of a part is unknown, because its line has no numbers, a z
+or an unknown side, or repeats a designator, there is the error instead, which names the line."""
 
 
 def read_pick_and_place(path: Path, units: Units | None = None) -> tuple[PartTable, list[str]]:
@@ -76,8 +77,7 @@ def read_pick_and_place(path: Path, units: Units | None = None) -> tuple[PartTab
     its lengths if it does not state them.
 
     Raises:
-        DesignError: the file is missing, lacks the columns or has no parts; or it has positions in
-            space.
+        DesignError: the file is missing, lacks the columns or has no parts.
     """
     lines = _lines(path)
     for number, line in enumerate(lines):
@@ -88,7 +88,6 @@ def read_pick_and_place(path: Path, units: Units | None = None) -> tuple[PartTab
                 rows = [(n, _cells(text, delimiter))
                         for n, text in enumerate(lines[number + 1 :], start=number + 2)
                         if text.strip() and not text.lstrip().startswith("#")]  # fmt: skip
-                _refuse_space(path, head, rows)
                 unit = _unit(head, columns, lines[: number + 1]) or units
                 return _placed(path, rows, columns, unit), _without(path, columns)
     raise DesignError(
@@ -133,26 +132,6 @@ def _column(head: list[str], key: str) -> int | None:
     extra = r"\(.*?\)|\[.*?\]|_?(?:mm|mil|deg|degrees)$|[^a-z]"
     plain = [re.sub(extra, "", cell.lower().strip()) for cell in head]
     return next((plain.index(name) for name in NAMES[key] if name in plain), None)
-
-
-def _refuse_space(path: Path, head: list[str], rows: list[tuple[int, list[str]]]) -> None:
-    """Check that z, if there is such a column, is 0 in all rows.
-
-    Raises:
-        DesignError: it is not.
-    """
-    column = _column(head, "z")
-    if column is None:
-        return
-    for number, cells in rows:
-        match = _NUMBER.match(_cell(cells, column))
-        if match is not None and float(match[1]) != 0.0:
-            raise DesignError(
-                f"the column '{brief(head[column])}' says that these are positions in space, and "
-                "positions on a board are needed",
-                where=f"{path}:{number}",
-                hint="Give the table of one board, such as board-1.pos of 'optisense export'",
-            )
 
 
 def _unit(head: list[str], columns: dict[str, int | None], before: list[str]) -> str | None:
@@ -205,6 +184,13 @@ def _placed(
 
 def _part(cells: dict[str, str], unit: str | None, path: Path, number: int) -> BoardPart:
     name = cells["designator"]
+    if not _ZERO.match(cells["z"]):
+        raise DesignError(
+            f"'{brief(cells['z'])}', the z of '{brief(name)}', is not 0: this is a position in "
+            "space, and one on a board is needed",
+            where=f"{path}:{number}",
+            hint="Give the table of one board, such as board-1.pos of 'optisense export'",
+        )
     x, y = (_length(cells[key], unit, path, number) for key in ("x", "y"))
     rotation = _rotation(cells["rotation"], path, number)
     if not all(abs(value) <= LARGEST for value in (x, y, rotation)):

@@ -236,7 +236,7 @@ def test_pick_and_place_files_of_all_programs(
         (ALTIUM.replace("-500.000", "here"), "'here' is no length"),
         (ALTIUM.split('"D1"')[0], "has no parts"),
         (ALTIUM.replace("-500.000", "1" * 31), "too large a number: at most 10,000 mm"),
-        (placement_csv(placements(sensors.gelsight360())), "'z_mm' .* positions in space"),
+        (placement_csv(placements(sensors.gelsight360())), "z of 'D1', is not 0: .* in space"),
         (ALTIUM.replace('"180"', '"N/A"'), r"'N/A' is no rotation .*csv:8"),
         (ALTIUM.replace("BottomLayer", "2"), r"'2' is no side of a board .*csv:8"),
         (ALTIUM.replace("D2", "D1"), r"'D1' is also in line 7 .*csv:8"),
@@ -256,12 +256,15 @@ def test_rows_that_are_not_chosen_may_be_faulty(tmp_path: Path) -> None:
     file.write_text(
         "Ref,X_mm,Y_mm,Z_mm,Rot,Side\nREF**,1,1,,0,top\nREF**,9,1,0,0,top\n"
         "X1,5,5,0,N/A,top\nX2,6,6,0,0,MultiLayer\nD1,2,3,0.0,90,top\n"
+        'D2,4,3,"-0,00 mm",90,top\nH1,7,7,1.6,0,top\nH2,7,9,"1,6",0,top\nH3,7,9,3.,0,top\n'
     )
     found = read_pick_and_place(file)[0]
     choice = FromTable(file=file.name, only="D*", origin=(0.0, 0.0, 0.0), gap=0.0)
-    (led,) = from_table(choice, found)
-    assert led.position == (2.0, 3.0, 0.0)
-    for only, words in (("REF**", "also in line 2"), ("X1", "'N/A' is no"), ("X2", "no side")):
+    lights = from_table(choice, found)
+    assert [light.position for light in lights] == [(2.0, 3.0, 0.0), (4.0, 3.0, 0.0)]
+    faults = {"REF**": "also in line 2", "X1": "'N/A' is no", "X2": "no side"}
+    faults |= {"H1": "'1.6', .* is not 0.*csv:8", "H2": "'1,6', .* not 0", "H3": "'3.', .* not 0"}
+    for only, words in faults.items():
         with pytest.raises(DesignError, match=words):
             from_table(choice.model_copy(update={"only": only}), found)
 
