@@ -2,7 +2,7 @@
 and its skin. Lengths are in metres there, and masses in kilograms.
 """
 
-from optisense.robots._body import Frame, SensorBody, sensor_body
+from optisense.robots._body import Frame, SensorBody, Skin, sensor_body
 from optisense.robots.formats import ROBOT_FORMATS, RobotFormat, export_robot
 
 __all__ = [
@@ -10,6 +10,7 @@ __all__ = [
     "Frame",
     "RobotFormat",
     "SensorBody",
+    "Skin",
     "export_robot",
     "sensor_body",
 ]

@@ -17,8 +17,8 @@ from optisense.design.projection import picture_places
 from optisense.errors import DesignError, OwnCodeError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.solids import as_manifold
-from optisense.robots import RobotFormat, SensorBody, export_robot, sensor_body
-from optisense.robots._body import KILOGRAMS, Frame, _skin_frame, mass_properties
+from optisense.robots import Frame, RobotFormat, SensorBody, Skin, export_robot, sensor_body
+from optisense.robots._body import KILOGRAMS, _skin_frame, mass_properties
 from optisense.robots._collision import COVERED, depth_in
 from optisense.workshop.shapes import shapes
 
@@ -194,6 +194,7 @@ def test_each_skin_has_a_touch_sensor_of_its_own(tmp_path: Path) -> None:
     design.parts |= {"back": design.parts["skin"], "case": Part(role=Role.BLOCKER, mesh="case.obj")}
     design.meshes.update({"back": back, "case": TriangleMesh.box((-9, -9, -52), (9, 9, -48))})
     body = sensor_body(design)
+    assert all(isinstance(each, Skin) for each in body.skins)
     assert [each.suffix for each in body.skins] == ["-skin", "-back"]
     made = Made(design, body, *export_robot(design, tmp_path, ["mujoco", "urdf"])[:2])
     assert 'name="gelsight-mini-ideal_skin-back"' in made.urdf.read_text()
