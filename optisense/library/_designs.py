@@ -145,40 +145,40 @@ class NominalFlux(NamedTuple):
 
     Attributes:
         flux: radiant flux, mW. That of a mixed colour is the largest at which none of its red,
-            green and blue dies exceeds its own nominal flux.
+            green and blue LEDs exceeds its own nominal flux.
         light: the light in words, such as "red smd-3528".
-        die: name of the colour in the library; that of the die that limits a mixed colour.
+        colour: name of the colour in the library; that of the LED that limits a mixed colour.
         words: the flux in words, with the current if it is known.
     """
 
     flux: float
     light: str
-    die: str
+    colour: str
     words: str
 
 
 def nominal_flux(model: str, colour: Colour) -> NominalFlux | None:
     """Return the nominal flux of a light of the library that has these shares of R, G and B, or
-    None if the library does not state that of one of its dies.
+    None if the library does not state that of one of its LEDs.
     """
-    dies = [(1.0, typical_colour(model, colour))]
-    mixed = dies[0][1] is None
+    leds = [(1.0, typical_colour(model, colour))]
+    mixed = leds[0][1] is None
     if mixed:
         shares = np.array(colour) / sum(colour)
         unit = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-        dies = [(float(shares[k]), typical_colour(model, unit[k])) for k in np.flatnonzero(shares)]
+        leds = [(float(shares[k]), typical_colour(model, unit[k])) for k in np.flatnonzero(shares)]
     limits: list[tuple[float, str, TypicalLight]] = []
-    for share, die_known in dies:
-        if die_known is None or die_known[1].flux is None:
+    for share, known in leds:
+        if known is None or known[1].flux is None:
             return None
-        limits.append((die_known[1].flux / share, *die_known))
-    flux, die, typical = min(limits, key=lambda limit: limit[0])
+        limits.append((known[1].flux / share, *known))
+    flux, name, typical = min(limits, key=lambda limit: limit[0])
     at = f" at {typical.current:g} mA" if typical.current else ""
     if not mixed:
-        return NominalFlux(flux, f"{die} {model}", die, f"{flux:g} mW{at}")
+        return NominalFlux(flux, f"{name} {model}", name, f"{flux:g} mW{at}")
     flux = float(f"{flux:.9g}")  # without the rounding of the division
-    words = f"{flux:g} mW, of which its {die} die gives {typical.flux:g} mW{at}"
-    return NominalFlux(flux, f"{model} of this colour", die, words)
+    words = f"{flux:g} mW, of which its {name} LED gives {typical.flux:g} mW{at}"
+    return NominalFlux(flux, f"{model} of this colour", name, words)
 
 
 def unusual_fluxes(design: SensorDesign) -> list[str]:

@@ -114,7 +114,7 @@ def _lights(design: SensorDesign) -> list[Item]:
             note = f"{colour[0]}, {note}"
         nominal = nominal_flux(group.model, group.colour)
         if nominal is not None:
-            known = entry.source(f"flux.{nominal.die}") if entry is not None else None
+            known = entry.source(f"flux.{nominal.colour}") if entry is not None else None
             assumed = known is not None and known.status is Status.ASSUMED
             note += f"; nominal {nominal.words}{' (assumed)' if assumed else ''}"
             times = group.flux / nominal.flux

@@ -223,7 +223,7 @@ def test_specularity_runs_from_diffuse_to_nearly_a_mirror() -> None:
 
 
 @pytest.mark.parametrize(
-    ("colour", "flux", "die"),
+    ("colour", "flux", "led"),
     [
         ((2.0, 0.0, 0.0), 1.5, "red"),
         ((1.0, 1.0, 1.0), 4.5, "red"),
@@ -231,10 +231,10 @@ def test_specularity_runs_from_diffuse_to_nearly_a_mirror() -> None:
         ((0.1, 0.9, 0.0), 2.2 / 0.9, "green"),
     ],
 )
-def test_the_nominal_flux_of_a_colour_is_that_of_its_weakest_die(
-    colour: tuple[float, float, float], flux: float, die: str
+def test_the_nominal_flux_of_a_colour_is_that_of_its_weakest_led(
+    colour: tuple[float, float, float], flux: float, led: str
 ) -> None:
     found = library.nominal_flux("smd-0805", colour)
-    assert found is not None and found.die == die
+    assert found is not None and found.colour == led
     assert found.flux == pytest.approx(flux, abs=1e-6)
-    assert library.nominal_flux("round-5mm-15", (1.0, 1.0, 0.0)) is None  # it has no red die
+    assert library.nominal_flux("round-5mm-15", (1.0, 1.0, 0.0)) is None  # it has no red LED

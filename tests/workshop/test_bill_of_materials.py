@@ -56,7 +56,7 @@ def test_a_light_that_must_give_more_than_it_can_is_remarked_on(flat: SensorDesi
     assert "nominal 18 mW at 20 mA" in lights["blue"].note
     bright.lights["blue"].colour = (1.0, 0.0, 1.0)
     mixed = items(bright, "light")["blue"].note
-    assert "nominal 4.2 mW, of which its red die gives 2.1 mW" in mixed
+    assert "nominal 4.2 mW, of which its red LED gives 2.1 mW" in mixed
     assert "2.4 times its nominal flux" in mixed
 
 

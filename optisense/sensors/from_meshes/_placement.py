@@ -104,7 +104,7 @@ def _flux(choice: LightChoice, colour: tuple[float, float, float]) -> tuple[floa
     if nominal is None:
         source = "a bright LED; neither the recipe nor the library states a flux"
         return USUAL_FLUX, Provenance(status=Status.ASSUMED, source=source)
-    found = library.entry("light", choice.model).source(f"flux.{nominal.die}")
+    found = library.entry("light", choice.model).source(f"flux.{nominal.colour}")
     status = Status.ASSUMED if found is None else found.status
     source = f"nominal flux of a {nominal.light} in the library, {nominal.words}"
     if found is not None:

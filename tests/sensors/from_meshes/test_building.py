@@ -362,13 +362,13 @@ class TestFlux:
             assert "blue smd-3528 in the library, 18 mW at 20 mA" in source.source
             assert source.source.endswith(entry.source("flux.blue").source)
 
-    def test_no_die_of_a_mixed_colour_exceeds_its_nominal_flux(self, cad: Any) -> None:
+    def test_no_led_of_a_mixed_colour_exceeds_its_nominal_flux(self, cad: Any) -> None:
         flux, source = self.group(cad, "smd-3528, colour: white")
         assert flux == pytest.approx(3 * 2.1)  # red is the weakest of 2.1, 2.3 and 18 mW
-        assert "of which its red die gives 2.1 mW at 20 mA" in source.source
+        assert "of which its red LED gives 2.1 mW at 20 mA" in source.source
 
     def test_unknown_to_the_library(self, cad: Any) -> None:
-        """The library states no flux of a red die."""
+        """The library states no flux of a red LED."""
         flux, source = self.group(cad, "round-5mm-15, colour: white")
         assert flux == 10.0 and source.status is Status.ASSUMED
         assert "neither the recipe nor the library" in source.source
