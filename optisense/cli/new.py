@@ -17,6 +17,8 @@ from optisense.text import argument
 
 if TYPE_CHECKING:
     from optisense.sensors.from_meshes import Recipe
+    from optisense.sensors.from_meshes.recipe import CameraChoice
+    from optisense.sensors.from_meshes.recipe_lights import LightChoice
 
 
 @handles_errors
@@ -252,14 +254,31 @@ def _print_guesses(recipe: Recipe, guessed: bool, unit_too: bool) -> None:
     if unit_too and recipe.units is not None:
         messages.print(f"guessed: unit {recipe.units}")
     for name, part in recipe.parts.items():
-        faces = f"faces of {part.faces_of} towards {part.towards}"
-        faces += ", and those that continue them smoothly" if part.tangent else ""
-        source = ", body ".join([part.file or faces, *part.solids])
-        messages.print(f"guessed: {name} is {part.role.value} ({source})")
-    groups = ", ".join(recipe.lights)
-    messages.print(f"guessed: lights {groups}; camera {recipe.camera.model}")
+        messages.print(f"guessed: {name} is {part.role.value} ({part.source})")
+    for name, group in recipe.lights.items():
+        messages.print(f"guessed: lights {name}, {_place_of_lights(group)}")
+    messages.print(f"guessed: camera {recipe.camera.model}, {_place_of_camera(recipe.camera)}")
     if all(group.colour == "white" for group in recipe.lights.values()):
         messages.print("guessed: all lights are white, as no name says red, green or blue")
+
+
+def _place_of_lights(group: LightChoice) -> str:
+    """Return in words where guessed lights are."""
+    if group.over is not None:
+        return f"on the faces of {group.over.source} towards {group.over.towards}"
+    if group.ring is not None:
+        return f"in a ring inside {group.ring.part}"
+    assert group.row is not None
+    return f"in a row at the side {group.row.side} of {group.row.part}"
+
+
+def _place_of_camera(camera: CameraChoice) -> str:
+    """Return in words where the guessed camera is."""
+    if camera.at is None:
+        return "behind the sensing surface"
+    if isinstance(camera.at, tuple):
+        return "at ({:g}, {:g}, {:g}) mm".format(*camera.at)
+    return f"in the middle of {camera.at.source}"
 
 
 def _print_next_steps(folder: Path, recipe: Path | None = None) -> None:

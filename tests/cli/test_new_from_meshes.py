@@ -180,6 +180,8 @@ def test_guesses_are_told(tmp_path: Path) -> None:
     code, text = new("--from-meshes", CAD, tmp_path / "pad", "--yes")
     assert code == 0, text
     assert "guessed: housing is blocker (housing.stl)" in text
+    assert "guessed: lights leds, on the faces of leds.stl towards -x" in text
+    assert "guessed: camera pi-v2, in the middle of lens.stl" in text
     assert "guessed: all lights are white" in text
     assert set(read_recipe(tmp_path / "pad" / "recipe.yaml").parts) == {
         "gel", "skin", "window", "housing",

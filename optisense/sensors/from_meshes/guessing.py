@@ -78,8 +78,9 @@ CLEAR = {"acrylic", "clear", "glass", "pmma", "transparent"}
 """Words that tell a clear body also before a word for its kind, as in clear cover."""
 
 CARRIED = 0.2
-"""Share of a gel's surface that a body of unknown use touches if it carries the gel. The inner side
-of a flat gel or of a shell is a third to a half of its surface, the sides are less."""
+"""Share of a gel's surface that a body touches if it carries the gel, where the body's name doesn't
+tell its use. The inner side of a flat gel or of a shell is a third to a half of its surface, the
+sides are less."""
 
 NEAR = 0.003
 """Distance at which bodies touch, as a share of the gel's length: 0.1 mm on a gel of 36 mm, as
@@ -114,7 +115,7 @@ def _each_body(source: Path, chosen: Sequence[str]) -> list[CadBody]:
             hint="In the CAD tool: export each part as STL, OBJ or PLY, or all as one STEP file",
         )
     reader, found, taken = CadFiles(folder), list[CadBody](), set[str]()
-    unknown = set[str]()
+    doubtful = set[str]()
     for file in files:
         bodies = reader.bodies(file.name)
         for body in bodies:
@@ -123,13 +124,13 @@ def _each_body(source: Path, chosen: Sequence[str]) -> list[CadBody]:
                 name, use = file.stem, guess_use(file.stem)
             name = _fresh(_as_name(name), taken)
             taken.add(name)
-            if use is None:
-                unknown.add(name)
+            if use is None or use == "camera":  # a lens may be the camera's or carry the gel
+                doubtful.add(name)
             found.append(CadBody(name, file.name, body, use or Role.BLOCKER))
     gels = [_outward(each.body.mesh) for each in found if each.use is Role.ELASTOMER]
     return [
         replace(each, use=Role.SUPPORT)
-        if each.name in unknown and _carries(_outward(each.body.mesh), gels)
+        if each.name in doubtful and _carries(_outward(each.body.mesh), gels)
         else each
         for each in found
     ]

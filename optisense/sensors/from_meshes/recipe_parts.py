@@ -54,6 +54,13 @@ class ShapeReference(Model):
         """Names of the bodies in a STEP file; empty if none is named."""
         return self.solid if isinstance(self.solid, list) else [self.solid] if self.solid else []
 
+    @property
+    def source(self) -> str:
+        """The file and the bodies in it, or the faces of another part, in words."""
+        faces = f"faces of {self.faces_of} towards {self.towards}"
+        faces += ", and those that continue them smoothly" if self.tangent else ""
+        return ", body ".join([self.file or faces, *self.solids])
+
     @model_validator(mode="after")
     def _one_source(self) -> ShapeReference:
         if (self.file is None) == (self.faces_of is None):

@@ -26,6 +26,7 @@ from optisense.sensors import check, save_design
 from optisense.sensors.from_meshes import design_from_meshes, guess_recipe, read_recipe, save_recipe
 from optisense.sensors.from_meshes.files import Use
 from optisense.sensors.from_meshes.guessing import guess_use
+from optisense.sensors.from_meshes.recipe_parts import ShapeReference
 from optisense.workshop import export
 
 
@@ -266,6 +267,14 @@ class TestGuessing:
         parts = guess_recipe(cad.folder).parts
         assert parts["core"].role is Role.SUPPORT
         assert parts["thing"].role is Role.BLOCKER
+
+    def test_a_lens_that_carries_the_gel_is_not_the_camera_s(self, cad: Any) -> None:
+        cad.write()
+        (cad.folder / "plate.stl").rename(cad.folder / "shaping_lens.stl")
+        recipe = guess_recipe(cad.folder)
+        assert recipe.parts["shaping_lens"].role is Role.SUPPORT
+        assert isinstance(recipe.camera.at, ShapeReference)
+        assert recipe.camera.at.file == "lens.stl"
 
     @pytest.mark.parametrize("share", [1.0, 0.5])
     @pytest.mark.parametrize("name", ["gel", "plate"])
