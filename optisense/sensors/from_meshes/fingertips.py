@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
+from optisense.array_types import FloatArray
 from optisense.design.posing import triple
 from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import inside
@@ -43,7 +44,11 @@ SPOKES = 36
 """Number of directions in which the distance to the wall of the cavity is measured."""
 
 STEP = 0.5
-"""Step (mm) in which the camera moves into the cavity until it is outside of all parts."""
+"""Step (mm) in which the camera moves into the cavity until it and the lights have room."""
+
+CAMERA_CLEARANCE = 0.1
+"""Distance (mm) from the pupil, along the axis of the dome, in which there is no solid: twice the
+smallest that a camera needs from a face."""
 
 
 def is_round(gel: TriangleMesh, outward: str) -> bool:
@@ -64,41 +69,31 @@ def is_round(gel: TriangleMesh, outward: str) -> bool:
 
 
 def lights_and_camera(
-    meshes: Mapping[str, TriangleMesh], clear: list[str], outward: str, light: str, flux: float
+    meshes: Mapping[str, TriangleMesh], gel: str, outward: str, light: str, flux: float
 ) -> tuple[dict[str, LightChoice], CameraChoice] | None:
     """Return a ring of red, green and blue lights at the open side of a hollow dome, whose tip
     points outward, and a fisheye within it that looks into the dome; None if there is no cavity
-    with room for them. The gel is the first of the transparent parts, and the flux is in mW.
+    with room for them. The dome is the part `gel`, and the flux is in mW.
     """
     axis, sign = axis_of(outward)
     way = vector(outward)
-    gel = meshes[clear[0]]
-    ends = sign * np.concatenate([meshes[name].bounds[:, axis] for name in clear])
-    bodies = [mesh for mesh in meshes.values() if mesh.is_closed]
-    pupil = gel.bounds.mean(axis=0)
-    for low in np.arange(ends.min(), (ends.min() + ends.max()) / 2.0, STEP):
+    bounds = meshes[gel].bounds
+    open_end, far_end = np.sort(sign * bounds[:, axis])
+    pupil = bounds.mean(axis=0)
+    for low in np.arange(open_end, (open_end + far_end) / 2.0, STEP):
         pupil[axis] = sign * low
-        if not any(inside(pupil, body).any() for body in bodies):
+        centre = pupil + LIGHT_HEIGHT * way
+        radius = round(_room(meshes.values(), pupil, centre, axis) - RING_CLEARANCE, 2)
+        if radius >= LEAST_RING:
             break
     else:
-        return None
-    centre = pupil + LIGHT_HEIGHT * way
-    angles = np.linspace(0.0, 2.0 * np.pi, SPOKES, endpoint=False)
-    spokes = np.zeros((SPOKES, 3))
-    spokes[:, (axis + 1) % 3], spokes[:, (axis + 2) % 3] = np.cos(angles), np.sin(angles)
-    nearest = np.full(SPOKES, np.inf)
-    for mesh in meshes.values():
-        hits = ray_hits(mesh, centre, spokes)
-        np.minimum.at(nearest, hits.ray, hits.distance)
-    radius = round(float(nearest.min()) - RING_CLEARANCE, 2)
-    if not np.isfinite(radius) or radius < LEAST_RING:
         return None
     arc = 120.0 * (1.0 - GAP_BETWEEN_COLOURS)
     count = 1 + int(np.radians(arc) * radius / LED_PITCH)
     lights = {}
     for number, colour in enumerate(("red", "green", "blue")):
         ring = Ring(
-            part=clear[0],
+            part=gel,
             axis=outward,
             count=count,
             radius=radius,
@@ -110,3 +105,20 @@ def lights_and_camera(
         lights[colour] = LightChoice(model=light, colour=colour, flux=flux, ring=ring)
     at = triple(np.round(pupil, 3))
     return lights, CameraChoice(model=FISHEYE, at=at, direction=outward)
+
+
+def _room(
+    meshes: Collection[TriangleMesh], pupil: FloatArray, centre: FloatArray, axis: int
+) -> float:
+    """Return the distance (mm) from the middle of a ring around an axis to the nearest wall; 0 if
+    there is none, or if the camera's pupil is in a solid or in the face of one.
+    """
+    way = np.eye(3)[axis]
+    near = pupil + CAMERA_CLEARANCE * np.stack([-way, way])
+    if any(mesh.is_closed and inside(near, mesh).any() for mesh in meshes):
+        return 0.0
+    angles = np.linspace(0.0, 2.0 * np.pi, SPOKES, endpoint=False)
+    spokes = np.zeros((SPOKES, 3))
+    spokes[:, (axis + 1) % 3], spokes[:, (axis + 2) % 3] = np.cos(angles), np.sin(angles)
+    distances = [ray_hits(mesh, centre, spokes).distance for mesh in meshes]
+    return float(min((found.min() for found in distances if len(found)), default=0.0))

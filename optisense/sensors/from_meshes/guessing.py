@@ -331,9 +331,7 @@ def usual_lights_and_camera(
     supports = [name for name, part in parts.items() if part.role is Role.SUPPORT]
     if dome:
         solid = {name: meshes[name] for name, part in parts.items() if part.faces_of is None}
-        gels = [name for name, part in parts.items() if part.role is Role.ELASTOMER]
-        clear = [carrier, *(name for name in [*gels, *supports] if name != carrier)]
-        inside = lights_and_camera(solid, clear, outward, LIGHT, usual_flux(LIGHT))
+        inside = lights_and_camera(solid, carrier, outward, LIGHT, usual_flux(LIGHT))
         if inside is not None:
             return inside
     window = supports[0] if supports else carrier

@@ -68,6 +68,22 @@ def test_a_dome_without_room_gets_rows_of_lights(tmp_path: Path) -> None:
     assert all(group.row is not None for group in recipe.lights.values())
 
 
+@pytest.mark.parametrize("hole", [5.0, 8.0])
+@pytest.mark.parametrize("name", ["base", "base_plate"])
+def test_lights_go_into_the_dome_and_not_into_the_hole_of_its_base(
+    tmp_path: Path, name: str, hole: float
+) -> None:
+    """The hole reaches from 3 mm below the dome to its open end at z = 0."""
+    shell(24.0, 18.0).export(tmp_path / "gel.stl")
+    base = trimesh.creation.annulus(hole, 26.0, 3.0).apply_translation((0, 0, -1.5))
+    base.export(tmp_path / f"{name}.stl")
+    recipe = guess_recipe(tmp_path)
+    rings = [group.ring for group in recipe.lights.values()]
+    assert [ring and ring.height for ring in rings] == [0.5] * 3
+    assert [ring and ring.radius for ring in rings] == pytest.approx([15.5] * 3, abs=0.1)
+    assert recipe.camera.at == pytest.approx((0, 0, 0), abs=1e-3)
+
+
 @pytest.mark.parametrize(
     ("mesh", "expected"),
     [
