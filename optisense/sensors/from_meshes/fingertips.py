@@ -12,7 +12,7 @@ from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import inside
 from optisense.geometry.patches import faces_towards, smoothly_joined
 from optisense.geometry.rays import ray_hits
-from optisense.sensors.from_meshes.directions import axis_of, vector
+from optisense.sensors.from_meshes.directions import SIDES, axis_of, vector
 from optisense.sensors.from_meshes.recipe import CameraChoice
 from optisense.sensors.from_meshes.recipe_lights import LightChoice, Ring
 from optisense.sensors.from_meshes.surfaces import WITHIN
@@ -66,6 +66,19 @@ def is_round(gel: TriangleMesh, outward: str) -> bool:
     sloping = np.intersect1d(joined, faces_towards(mesh, vector(outward), STEEP))
     area = float(mesh.face_areas[top].sum())
     return float(mesh.face_areas[sloping].sum()) - area > area
+
+
+def tip_of(gel: TriangleMesh) -> str | None:
+    """Return the side, such as +z, on which the tip of a hollow dome is, opposite to its opening;
+    None if the gel isn't one.
+    """
+    sides = np.stack([vector(side) for side in SIDES])
+    walls = set(ray_hits(gel, gel.bounds.mean(axis=0), sides).ray.tolist())
+    for number, side in enumerate(SIDES):
+        opposite = number ^ 1  # +x and -x, +y and -y, +z and -z are pairs
+        if number in walls and opposite not in walls and is_round(gel, side):
+            return side
+    return None
 
 
 def lights_and_camera(

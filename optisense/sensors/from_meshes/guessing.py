@@ -34,7 +34,7 @@ from optisense.sensors.from_meshes.files import (
     unread_files,
     with_copies,
 )
-from optisense.sensors.from_meshes.fingertips import LED_PITCH, is_round, lights_and_camera
+from optisense.sensors.from_meshes.fingertips import LED_PITCH, is_round, lights_and_camera, tip_of
 from optisense.sensors.from_meshes.recipe import CameraChoice, Recipe
 from optisense.sensors.from_meshes.recipe_lights import (
     USUAL_FLUX,
@@ -176,12 +176,15 @@ def guess_units(found: Iterable[CadBody]) -> Units | None:
 
 def guess_outward(meshes: dict[str, TriangleMesh], carrier: str) -> str:
     """Return the side on which the sensor is touched, such as +z: that of the body that carries the
-    coating which is away from the other bodies.
+    coating which is away from the other bodies, or that of its tip if it is a hollow dome and the
+    only body.
     """
     own = meshes[carrier]
     others = [mesh.bounds.mean(axis=0) for name, mesh in meshes.items() if name != carrier]
     if others:
         way = own.bounds.mean(axis=0) - np.mean(others, axis=0)
+    elif tip := tip_of(own):
+        return tip
     else:
         way = np.eye(3)[int(np.argmin(np.ptp(own.bounds, axis=0)))]
     sides = sorted(SIDES, key=lambda side: -float(vector(side) @ way))

@@ -12,6 +12,7 @@ import trimesh
 from optisense import OpticalModel, check
 from optisense.geometry import TriangleMesh
 from optisense.sensors.from_meshes import design_from_meshes, guess_recipe
+from optisense.sensors.from_meshes.directions import vector
 from optisense.sensors.from_meshes.fingertips import is_round
 
 DOMES = {"gel": (12.0, 10.0), "window": (10.0, 8.5)}
@@ -82,6 +83,22 @@ def test_lights_go_into_the_dome_and_not_into_the_hole_of_its_base(
     assert [ring and ring.height for ring in rings] == [0.5] * 3
     assert [ring and ring.radius for ring in rings] == pytest.approx([15.5] * 3, abs=0.1)
     assert recipe.camera.at == pytest.approx((0, 0, 0), abs=1e-3)
+
+
+def test_a_single_long_fingertip_is_touched_at_its_tip(tmp_path: Path) -> None:
+    """A tube with a dome, 30 x 30 x 33 mm, is smallest across."""
+    angle = np.linspace(0.0, np.pi / 2.0, 30)
+    arc = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    arc[-1, 0] = 0.0
+    outer, inner = 15.0 * arc + (0.0, 18.0), 9.0 * arc[::-1] + (0.0, 18.0)
+    profile = np.concatenate([[(15.0, 0.0)], outer, inner, [(9.0, 0.0), (15.0, 0.0)]])
+    tube = trimesh.creation.revolve(profile, sections=64)
+    for tip in ("+z", "-x"):
+        turned = tube.copy().apply_transform(trimesh.geometry.align_vectors((0, 0, 1), vector(tip)))
+        turned.export(tmp_path / "gel.stl")
+        recipe = guess_recipe(tmp_path)
+        assert recipe.parts["skin"].towards == tip
+        assert all(group.ring is not None for group in recipe.lights.values())
 
 
 @pytest.mark.parametrize(
