@@ -146,11 +146,12 @@ class BoundSpace:
         point = np.asarray(vector, dtype=float)
         found: dict[str, float | int | str] = {}
         for parameter, coordinate in zip(self.parameters, point.tolist(), strict=True):
-            kind, whole = parameter.kind, round(coordinate)
+            kind = parameter.kind
             if isinstance(kind, Choice):
-                found[parameter.name] = kind.labels[whole]
+                found[parameter.name] = kind.labels[round(coordinate)]
             else:
-                found[parameter.name] = whole if isinstance(kind, Integer) else coordinate
+                whole = isinstance(kind, Integer)
+                found[parameter.name] = round(coordinate) if whole else coordinate
         return found
 
     def check(self, vector: ArrayLike) -> None:
