@@ -50,8 +50,8 @@ class Requirement:
     @staticmethod
     @lru_cache(maxsize=256)  # all trials of a study have the same few
     def parse(text: str) -> Requirement:
-        """Parse a condition; the message of the SearchError marks the place
-        where a text is none.
+        """Parse a condition. The SearchError about a text that is no condition marks the place in
+        it that is wrong.
         """
         found = re.fullmatch(r"(?P<what>[^<>=]*)(?P<sign>>=|<=)(?P<limit>[^<>=]*)", text)
         if found is None:
@@ -164,8 +164,8 @@ def requirements_of(texts: Iterable[str]) -> list[Requirement]:
 
 
 def _refuse_impossible(wanted: Requirement) -> None:
-    """Raise SearchError if a quantity is unknown, or if its range, with any settings, excludes a
-    limit.
+    """Raise SearchError if a quantity is unknown, or if its range excludes the limit
+    whatever the settings are.
     """
     measured = wanted.objective()
     if callable(measured.range):

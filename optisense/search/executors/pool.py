@@ -81,9 +81,9 @@ class ProcessPool(Runner):
     """Pool of worker processes on this machine, each with its share of the processor's threads."""
 
     def __init__(self, evaluator: Evaluator, workers: int, threads: int | None = None) -> None:
-        """Start the workers, which get ready in the background, each with its share of processors
-        or some threads of the renderer; SearchError if there is none or the evaluator can't be
-        pickled.
+        """Start a number of workers, which get ready in the background; SearchError if the number
+        is below 1, or if the evaluator can't be pickled. The renderer of each has a number of
+        threads, which is the worker's share of the processors if `threads` is None.
         """
         if workers < 1:
             raise SearchError(f"the number of workers is {workers}", hint="Give 1 or more")

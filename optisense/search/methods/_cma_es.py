@@ -164,8 +164,8 @@ class CmaEs(Method):
 
     @contextmanager
     def _own_randomness(self) -> Iterator[None]:
-        """Set NumPy's global generator to this method's state and linear algebra to one thread, for
-        a while.
+        """Set NumPy's global generator to this method's state and limit linear algebra to one
+        thread until the end of the block.
         """
         theirs = np.random.get_state()
         np.random.set_state(self._state)

@@ -150,8 +150,8 @@ def _groups(space: BoundSpace) -> list[list[int]]:
 
 
 def _options(space: BoundSpace) -> int:
-    """Return the number of types, which is the same for all lights; SearchError for other
-    parameters.
+    """Return the number of types, which is the same for all lights; SearchError if a
+    parameter is not the type of a light.
     """
     for parameter in space.parameters:
         if not isinstance(parameter.variable, LightType):

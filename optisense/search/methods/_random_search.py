@@ -42,9 +42,9 @@ class Random(Method):
 
 @contextmanager
 def _held_interrupts() -> Iterator[None]:
-    """Hold Ctrl-C back until the end of the block, where signals can be handled. SciPy loads the
-    tables of Sobol's sequence in compiled code that drops exceptions: after a KeyboardInterrupt the
-    search would go on with incomplete tables.
+    """Hold Ctrl-C back until the end of the block; nothing changes outside the main thread, where
+    signals can't be handled. SciPy loads the tables of Sobol's sequence in compiled code that drops
+    exceptions: after a KeyboardInterrupt the search would go on with incomplete tables.
     """
     before = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(before):

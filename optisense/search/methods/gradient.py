@@ -18,9 +18,10 @@ A point that constraints on shapes forbid is replaced by the nearest feasible on
 (`optisense.search.methods._feasible`), so that the ascent slides along the constraint and no trial
 is spent. An ascent that treated the forbidden point as a bad one stopped at the first wall.
 
-Ray derivatives are checked (`optisense.search.methods.checked_gradients`): the gradient consists of
-central differences by each parameter if the two disagree, if rays have no derivative (by the shape
-of a transparent part), or if there are few parameters.
+At the start the ray derivative is compared with central differences of the true score
+(`optisense.search.methods.checked_gradients`). The gradient consists of central differences by each
+parameter if the two disagree, if rays have no derivative (by the shape of a transparent part), or
+if there are few parameters.
 """
 
 from __future__ import annotations

@@ -37,8 +37,8 @@ class Edit:
 
     def apply(self, design: SensorDesign, values: Sequence[Any]) -> SensorDesign:
         """Return a design with these plain Python values, one for each path. It is unchecked, and
-        shares everything else with the given design, which has the structure of that of the
-        look-up.
+        shares everything else with the given design, which has the structure of the one
+        in which the paths were looked up.
         """
         if not self._root:
             return design

@@ -57,8 +57,8 @@ class PartsInContact:
     """
 
     def __init__(self, design: SensorDesign, moved: Collection[str]) -> None:
-        """Find the contacts of parts that move with others in the design that the search starts
-        from.
+        """Find the contacts of the parts that are shifted or turned, `moved`, in the design that
+        the search starts from.
         """
         self._meshes = design.deformed_meshes()
         self._pairs = [

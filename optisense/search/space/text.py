@@ -36,7 +36,9 @@ TOGETHER = "together"
 
 
 def parse_vary(text: str) -> tuple[str, Specification]:
-    """Parse the path and the specification of a parameter; SearchError if the text is none."""
+    """Parse the path and the specification of a parameter; SearchError if the text can't be read,
+    or if its bounds are invalid.
+    """
     path, equals, rest = (part.strip() for part in text.partition("="))
     if not equals or not path or not rest:
         raise SearchError(f"'{text}' is not a parameter and its range", hint=EXAMPLE)

@@ -110,7 +110,7 @@ class Store:
 
     @staticmethod
     def open(path: Path, objectives: Sequence[str]) -> Store:
-        """Open a store for reading; SearchError if the file is none, or of a newer version."""
+        """Open a store for reading; SearchError if the file is no store, or of a newer version."""
         check_size(path, MOST_STORE, SearchError, "the study's store")
         store = Store(path, objectives)
         with store._read() as db:
