@@ -36,14 +36,14 @@ LATER_ARRAYS: ArrayKinds = {
     "penetration": ("f", None),
     "displacement": ("f", 3),
 }
-"""Those of arrays that may be missing: release 0.1 wrote none of them, and only an elastic skin has
-pressure, penetration and displacement."""
+"""Kinds and channels of arrays that may be missing: release 0.1 wrote none of them, and only an
+elastic skin has pressure, penetration and displacement."""
 
 BACKGROUND_ARRAYS: ArrayKinds = {"image": ("u", 3), "points": ("f", 3), "normals": ("f", 3)}
-"""Those of the arrays of `BACKGROUND`."""
+"""Kinds and channels of the arrays of `BACKGROUND`."""
 
 CAMERA_ARRAYS: ArrayKinds = {"points": ("f", 3), "directions": ("f", 3)}
-"""Those of the arrays of `CAMERA`."""
+"""Kinds and channels of the arrays of `CAMERA`."""
 
 
 @dataclass(frozen=True)
