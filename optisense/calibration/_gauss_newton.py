@@ -316,7 +316,8 @@ class LayeredFit:
 
     def _root_mean_square(self, pictures: list[FloatArray], index: int) -> float:
         """Return the root mean square of the error of the background or near a contact, levels."""
-        return float(np.sqrt((self._error(pictures, index)[self._masks[index + 1]] ** 2).mean()))
+        error = self._compared_pixels(self._error(pictures, index), index)
+        return float(np.sqrt((error**2).mean()))
 
     def _scales(self, point: _Point) -> Scales:
         """Return the sizes of the errors, unaffected by dust."""
@@ -338,8 +339,14 @@ class LayeredFit:
     def _residuals(self, pictures: list[FloatArray], index: int, scales: Scales) -> FloatArray:
         """Return the residuals (k, 3) of the background (index -1), or those near a contact."""
         size = scales.of(index).size * scales.expected[index + 1]
-        mask = self._masks[index + 1]
-        return np.asarray(self._error(pictures, index)[mask] / size[mask])
+        error = self._error(pictures, index)
+        return self._compared_pixels(error, index) / self._compared_pixels(size, index)
+
+    def _compared_pixels(self, values: FloatArray, index: int) -> FloatArray:
+        """Return the values (k, 3) of the k pixels of a picture (h, w, 3) that are compared: all of
+        the background, without a copy, or those near a contact.
+        """
+        return values.reshape(-1, 3) if index < 0 else values[self._masks[index + 1]]
 
     def _cost(self, point: _Point, scales: Scales) -> float:
         total = float((self._prior(point) ** 2).sum())
