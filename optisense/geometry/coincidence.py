@@ -6,6 +6,8 @@ their planes nearly parallel. Patches are found pairwise and cut out in the plan
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,7 +27,7 @@ from optisense.geometry._flat_polygons import (
     is_shape,
     lie_apart,
 )
-from optisense.geometry.crossings import overlapping_boxes
+from optisense.geometry.box_pairs import PAIRS_AT_ONCE, overlapping_boxes
 from optisense.geometry.mesh import TriangleMesh
 
 PARALLEL = float(np.cos(np.radians(10.0)))
@@ -72,7 +74,18 @@ def find_coincident(
     if not boxes_overlap(first, second, -tolerance):
         return Overlay(first, second, np.zeros((0, 2), dtype=np.int64))
     twins = _twins(first, second, tolerance)
-    pairs = np.concatenate([twins, _near_pairs(first, second, tolerance, without=twins)])
+    batches = itertools.chain(
+        np.split(twins, range(PAIRS_AT_ONCE, len(twins), PAIRS_AT_ONCE)),
+        _near_pairs(first, second, tolerance, without=twins),
+    )
+    pairs = [_coincident(first, second, batch, tolerance, facing) for batch in batches]
+    return Overlay(first, second, np.concatenate(pairs))
+
+
+def _coincident(
+    first: TriangleMesh, second: TriangleMesh, pairs: Pairs, tolerance: float, facing: bool
+) -> Pairs:
+    """Return those of some pairs of faces that coincide; see `find_coincident`."""
     cosine = np.einsum(
         "ij,ij->i", first.face_normals[pairs[:, 0]], second.face_normals[pairs[:, 1]]
     )
@@ -93,7 +106,7 @@ def find_coincident(
     patches = common(frames.corners[others], corners[others, :, :2])
     apart = np.abs(heights_over(patches, corners[others])).max(axis=1, initial=0)
     whole[others] = is_shape(*area_and_length(patches)) & (apart <= tolerance)
-    return Overlay(first, second, pairs[whole])
+    return pairs[whole]
 
 
 @dataclass(frozen=True)
@@ -116,10 +129,11 @@ def sample_seam(one: TriangleMesh, other: TriangleMesh, reach: float) -> Seam:
     to a reach, mm, at points spread evenly over the faces of one of them that are near the other:
     of the one with less area there.
     """
+    nothing = Seam(np.zeros(0), np.zeros((0, 3)), 0.0)
     near = np.flatnonzero(_in_reach(one, other, reach))
     facing = np.flatnonzero(_in_reach(other, one, reach))
     if len(near) == 0 or len(facing) == 0:
-        return Seam(np.zeros(0), np.zeros((0, 3)), 0.0)
+        return nothing
     if one.face_areas[near].sum() > other.face_areas[facing].sum():
         one, other, near, facing = other, one, facing, near
     share = (np.arange(SEAM_SAMPLES) + 0.5) / SEAM_SAMPLES
@@ -129,7 +143,10 @@ def sample_seam(one: TriangleMesh, other: TriangleMesh, reach: float) -> Seam:
     points = np.einsum("kc,kci->ki", weights, one.triangles[own])
     ends = points + reach * np.array([[[-1.0]], [[1.0]]]) * one.face_normals[own]
     boxes = (corner[facing] for corner in other.face_bounds)
-    point, face = overlapping_boxes(ends.min(axis=0), ends.max(axis=0), *boxes)
+    pairs = list(overlapping_boxes(ends.min(axis=0), ends.max(axis=0), *boxes))
+    if not pairs:
+        return nothing
+    point, face = np.concatenate(pairs, axis=1)
     face = facing[face]
     frames = _Frames.of(one, own[point])
     opposite = np.einsum("pi,pi->p", frames.axes[:, 2], other.face_normals[face]) < -PARALLEL
@@ -268,18 +285,18 @@ def _in_reach(first: TriangleMesh, second: TriangleMesh, tolerance: float) -> ND
 
 def _near_pairs(
     first: TriangleMesh, second: TriangleMesh, tolerance: float, without: Pairs
-) -> Pairs:
-    """Return the pairs of faces, not in `without`, whose boxes, grown by `tolerance`, overlap."""
+) -> Iterator[Pairs]:
+    """Find the pairs of faces, not in `without`, whose boxes, grown by `tolerance`, overlap; they
+    come in batches.
+    """
     reach_1, reach_2 = _in_reach(first, second, tolerance), _in_reach(second, first, tolerance)
     reach_1[without[:, 0]] = False
     reach_2[without[:, 1]] = False
     kept_1, kept_2 = np.flatnonzero(reach_1), np.flatnonzero(reach_2)
-    if len(kept_1) == 0 or len(kept_2) == 0:
-        return np.zeros((0, 2), dtype=np.int64)
     low_1, high_1 = (corner[kept_1] for corner in first.face_bounds)
     low_2, high_2 = (corner[kept_2] for corner in second.face_bounds)
-    one, other = overlapping_boxes(low_1, high_1, low_2 - tolerance, high_2 + tolerance)
-    return np.column_stack([kept_1[one], kept_2[other]])
+    for one, other in overlapping_boxes(low_1, high_1, low_2 - tolerance, high_2 + tolerance):
+        yield np.column_stack([kept_1[one], kept_2[other]])
 
 
 def _united(

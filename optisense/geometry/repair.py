@@ -368,7 +368,7 @@ def _within(bodies: list[TriangleMesh], where: str | None) -> BoolArray:
             other = bodies[two]
             if not boxes_overlap(body, other, TOUCH):
                 continue
-            if len(near_pairs(body, other)[0]) == 0:  # surfaces that keep apart
+            if next(near_pairs(body, other), None) is None:  # surfaces that keep apart
                 result[one, two] = inside(body.vertices[0], other)[0]
                 result[two, one] = inside(other.vertices[0], body)[0]
                 continue
