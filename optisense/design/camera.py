@@ -151,16 +151,17 @@ class Camera(ImagingModel, Viewpoint):
         half = np.radians(0.5 * self.fov)
         return float(0.5 / (half if self.projection == "equidistant" else np.tan(half)))
 
-    def picture_chain(self, vergence: NDArray[np.floating] | None = None) -> PictureChain:
+    def picture_chain(self, vergences: NDArray[np.floating] | None = None) -> PictureChain:
         """Return the chain that turns radiance into the camera's picture.
 
         Args:
-            vergence: inverse (h, w) of the apparent distance of the scene over the camera's own
-                picture, of any size, 1/mm. If it is None, a blur that depends on depth is left out.
+            vergences: inverses (h, w, 2) of the scene's apparent distances in the two principal
+                planes over the camera's own picture, of any size, 1/mm. If they are None, a blur
+                that depends on depth is left out.
         """
         focus = None
-        if self.blur is not None and (vergence is not None or not self.blur.by_depth):
-            focus = SoftFocus.of(self.blur, self, vergence)
+        if self.blur is not None and (vergences is not None or not self.blur.by_depth):
+            focus = SoftFocus.of(self.blur, self, vergences)
         return PictureChain(
             response=self.any_response,
             shading=self.shading,

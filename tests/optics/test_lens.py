@@ -11,15 +11,19 @@ import numpy as np
 import pytest
 
 import optisense as ots
+from optisense import library
 from optisense.design import SensorDesign
 from optisense.design.lenses import LensDistortion
+from optisense.design.lenses.blur import Defocus
+from optisense.design.lenses.film import PictureWindow
 from optisense.design.projection import directions, ideal_places, image_edges
 from optisense.design.responses import PictureChain
 from optisense.errors import DesignError, LibraryError
 from optisense.optics import OpticalModel
 from optisense.optics.backend.arrays import floats
 from optisense.optics.camera.projection import Pose, RayCamera
-from optisense.optics.transport.apparent_distance import apparent_vergence
+from optisense.optics.transport.apparent_distance import apparent_vergences
+from optisense.optics.transport.chief_rays import trace_to_skin
 from optisense.sensors import SENSORS
 
 BARREL = {"kind": "brown-conrady", "k1": -0.3, "k2": 0.05, "p1": 0.004, "centre": [0.52, 0.49]}
@@ -153,8 +157,8 @@ def test_the_skin_appears_as_far_away_as_the_layers_in_front_of_it_say() -> None
     """13 mm of air, 5 mm of acrylic and 4.25 mm of gel: on the axis each appears thinner by its
     index."""
     model = OpticalModel(mini())
-    vergence = apparent_vergence(model.scenes.fine.scene, model.camera((33, 25)))
-    assert 1.0 / vergence[12, 16] == pytest.approx(13.0 + 5.0 / 1.491 + 4.25 / 1.41, rel=1e-3)
+    vergences = apparent_vergences(model.scenes.fine.scene, model.camera((33, 25)))
+    assert 1.0 / vergences[12, 16] == pytest.approx(13.0 + 5.0 / 1.491 + 4.25 / 1.41, rel=1e-3)
 
 
 def test_in_air_the_distance_is_the_distance() -> None:
@@ -165,8 +169,58 @@ def test_in_air_the_distance_is_the_distance() -> None:
     for changes in ({}, {"distortion": BARREL}):
         camera = design.camera.model_dump(mode="json") | changes
         model = OpticalModel(ots.set_value(design, "camera", camera))
-        vergence = apparent_vergence(model.scenes.fine.scene, model.camera((32, 24)))
-        assert 1.0 / vergence == pytest.approx(22.25, rel=3e-3)
+        vergences = apparent_vergences(model.scenes.fine.scene, model.camera((32, 24)))
+        assert 1.0 / vergences == pytest.approx(22.25, rel=3e-3)
+
+
+def traced_blur(model: OpticalModel, x: float, y: float) -> float:
+    """Return the root mean square, over both directions, of the standard deviation in pixels of the
+    rays from all of the pupil through the point in focus of a place of the camera's picture.
+    """
+    lens, camera = model.design.camera.blur, model.camera()
+    assert isinstance(lens, Defocus)
+    right, up, forward = camera.axes()
+    places = np.array([[x, y], [x + 1.0, y], [x, y + 1.0]])
+    chief = rays_of(camera, *places.T)
+    eye = np.array(model.design.camera.position)
+    number = np.arange(400) + 0.5
+    radius = 0.5 * lens.focal_length / lens.f_number * np.sqrt(number / 400)
+    turn = np.pi * (3.0 - np.sqrt(5.0)) * number  # the golden angle
+    pupil = eye + np.outer(radius * np.cos(turn), right) + np.outer(radius * np.sin(turn), up)
+    way = eye + chief[0] * lens.focus_distance / (chief[0] @ forward) - pupil
+    way /= np.linalg.norm(way, axis=1)[:, None]
+    origins, ways = np.concatenate([np.tile(eye, (3, 1)), pupil]), np.concatenate([chief, way])
+    points = trace_to_skin(model.scenes.fine.scene, origins, ways)[1]
+    steps = (points[1:3] - points[0]).T
+    found = np.linalg.lstsq(steps, (points[3:] - points[0]).T, rcond=None)[0]
+    return float(np.sqrt(found.var(axis=1).mean()))
+
+
+def behind_a_wedge() -> SensorDesign:
+    """Mini with the camera's side of its acrylic at 20 degrees, at the mean focus on the axis."""
+    lens = {"kind": "defocus", "focal_length": 3.04, "f_number": 2.0, "focus_distance": 19.1}
+    design = mini(blur=lens)
+    corners = design.meshes["guide"].vertices.copy()
+    back = np.isclose(corners[:, 2], corners[:, 2].min())
+    corners[back, 2] += np.tan(np.radians(20.0)) * corners[back, 0]
+    design.meshes["guide"] = replace(design.meshes["guide"], vertices=corners)
+    return design
+
+
+def behind_a_curved_mirror() -> SensorDesign:
+    """Svelte with a camera on sale, focused between its foci across and along its first mirror."""
+    return library.with_imaging(ots.load("builtin:gelsight-svelte"), "pi-v1", focus_distance=126.0)
+
+
+@pytest.mark.parametrize("build", [behind_a_wedge, behind_a_curved_mirror])
+def test_the_blur_of_an_astigmatic_view_has_the_variance_of_the_traced_one(build: Any) -> None:
+    model = OpticalModel(build())
+    focus, (width, height) = model.picture_chain.focus, model.design.camera.resolution
+    assert focus is not None
+    blur = focus.in_pixels(PictureWindow.whole(height, width))
+    for x in (width // 3, width // 2, 2 * width // 3):
+        traced = traced_blur(model, x, height // 2)
+        assert blur[height // 2, x] == pytest.approx(traced, rel=0.04)
 
 
 def test_what_is_in_focus_stays_sharp_and_what_is_not_is_blurred() -> None:

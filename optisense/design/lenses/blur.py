@@ -85,8 +85,8 @@ class LensBlur(KindModel):
         """Return the standard deviation (...) as a share of the picture's width.
 
         Args:
-            vergence: inverse (...) of the apparent distance of the point that a pixel sees, 1/mm; a
-                single 0 if `by_depth` is false.
+            vergence: inverse (...) of the apparent distance, in each principal plane, of the point
+                that a pixel sees, 1/mm; a single 0 if `by_depth` is false.
         """
 
 

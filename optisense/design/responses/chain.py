@@ -60,12 +60,20 @@ class SoftFocus:
 
     @classmethod
     def of(
-        cls, blur: LensBlur, camera: LensView, vergence: FloatingArray | None = None
+        cls, blur: LensBlur, camera: LensView, vergences: FloatingArray | None = None
     ) -> SoftFocus:
-        """Return the blur of a lens; `vergence` (h, w), 1/mm, is needed if it depends on depth."""
-        given = np.zeros((1, 1)) if vergence is None else vergence
+        """Return the blur of a lens.
+
+        It has the same standard deviation in all directions: the root mean square of those in the
+        two principal planes, so that its variance is that of the astigmatic blur.
+
+        Args:
+            vergences: the principal vergences (h, w, 2), 1/mm; needed if it depends on depth.
+        """
+        given = np.zeros((1, 1, 1)) if vergences is None else vergences
+        deviation = np.broadcast_to(blur.deviation(camera, given), given.shape)
         width, height = camera.resolution
-        return cls(np.atleast_2d(blur.deviation(camera, given)), height / width)
+        return cls(np.sqrt(np.mean(np.square(deviation), axis=-1)), height / width)
 
     def in_pixels(self, window: PictureWindow) -> FloatingArray:
         """Return the standard deviation (h, w), in pixels, for a window of a picture."""

@@ -5,7 +5,8 @@ in another direction, and the nearer the point, the larger the change. The chang
 five rays per place of the picture: the chief ray, one from a pupil shifted along each of its two
 axes, and two in slightly different directions. From their intersections with the skin follows the
 change of direction with the pupil that keeps the same point in sight. The rays are refracted and
-reflected as usual. In air the result is one over the distance.
+reflected as usual. The change is a matrix, whose eigenvalues are the two principal vergences. In
+air both are one over the distance.
 """
 
 from __future__ import annotations
@@ -58,22 +59,25 @@ def focused_chain(
         return camera.picture_chain()
     width, height = camera.resolution
     size = FOCUS_ACROSS, max(2, round(FOCUS_ACROSS * height / width))
-    return camera.picture_chain(apparent_vergence(scene(), rays(size)))
+    return camera.picture_chain(apparent_vergences(scene(), rays(size)))
 
 
-def apparent_vergence(scene: RayScene, camera: RayCamera) -> FloatArray:
-    """Return one over the distance at which the skin appears, for the middle of each pixel.
+def apparent_vergences(scene: RayScene, camera: RayCamera) -> FloatArray:
+    """Return the principal vergences of the skin, for the middle of each pixel.
+
+    A curved mirror or an oblique face shows a point at two distances, one in each principal plane
+    of the pencil of rays (astigmatism). A principal vergence is one over such a distance; it is
+    negative if the rays from the point converge towards the pupil.
 
     Distances are measured along the axis for perspective lenses, whose field of focus is flat, and
-    along the ray for fisheyes. A lens that sees the two directions across a ray at different
-    distances (astigmatism) gets the mean. Pixels that do not see the skin get the value of the
-    nearest one that does.
+    along the ray for fisheyes. Pixels that do not see the skin get the values of the nearest one
+    that does.
 
     Args:
         camera: the camera whose pixels are evaluated.
 
     Returns:
-        The vergence (h, w), 1/mm; 0 everywhere if no pixel sees the skin.
+        The smaller and the larger vergence (h, w, 2), 1/mm; 0 everywhere if no pixel sees the skin.
     """
     height, width = camera.height, camera.width
     index = np.arange(height * width)
@@ -100,11 +104,11 @@ def apparent_vergence(scene: RayScene, camera: RayCamera) -> FloatArray:
         needed = _solved(np.stack(by_film, axis=-1), np.stack(by_pupil, axis=-1))
         in_air = _solved(turning, across)  # at a distance of 1 mm
         ratio = needed @ np.linalg.inv(_safe(in_air))
-        vergence = 0.5 * np.trace(ratio, axis1=1, axis2=2)
+        vergences = _eigenvalues(ratio)
         if not camera.equidistant:
-            vergence = vergence / (direction @ forward)
-    good = seen & np.isfinite(vergence) & (np.abs(vergence) < LARGEST)
-    return _filled(vergence.reshape(height, width), good.reshape(height, width))
+            vergences = vergences / (direction @ forward)[:, None]
+        good = seen & (np.abs(vergences) < LARGEST).all(axis=1)
+    return _filled(vergences.reshape(height, width, 2), good.reshape(height, width))
 
 
 def _rays(
@@ -123,6 +127,16 @@ def _solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
     return np.linalg.inv(_safe(turned @ matrix)) @ turned @ right
 
 
+def _eigenvalues(matrix: FloatArray) -> FloatArray:
+    """Return the eigenvalues (k, 2), ascending, of matrices (k, 2, 2) whose eigenvalues are real.
+
+    Rounding can turn two equal eigenvalues into a complex pair, which counts as its real part.
+    """
+    mean = 0.5 * np.trace(matrix, axis1=1, axis2=2)
+    split = np.sqrt(np.maximum(mean**2 - np.linalg.det(matrix), 0.0))
+    return np.stack([mean - split, mean + split], axis=1)
+
+
 def _safe(matrix: FloatArray) -> FloatArray:
     """Return matrices (k, 2, 2) with NaN in place of those that cannot be inverted."""
     single = np.abs(np.linalg.det(matrix)) < 1e-30
@@ -130,6 +144,7 @@ def _safe(matrix: FloatArray) -> FloatArray:
 
 
 def _filled(values: FloatArray, good: NDArray[np.bool_]) -> FloatArray:
+    """Return values (h, w, 2), each that of the nearest good pixel (h, w)."""
     if not good.any():
         return np.zeros_like(values)
     nearest = distance_transform_edt(~good, return_distances=False, return_indices=True)
