@@ -237,6 +237,16 @@ def test_what_is_in_focus_stays_sharp_and_what_is_not_is_blurred() -> None:
     assert soft < 0.6 * plain
 
 
+def test_rays_that_meet_different_surfaces_do_not_count_as_blur() -> None:
+    """The largest deviation is that of the view, and not of the edges of the mirrors and the skin,
+    so that an interpolation up to it blurs lines."""
+    chain = OpticalModel(behind_a_curved_mirror()).picture_chain
+    assert chain.focus is not None and chain.focus.largest * 320 < 1.2
+    lines = np.zeros((240, 320, 3), dtype=np.float32)
+    lines[:, 160] = 1.0
+    assert chain.linear(lines)[120, 160].max() < 0.5 * chain.linear(np.ones_like(lines)).max()
+
+
 def test_pictures_are_noisy_by_their_seed_alone() -> None:
     design = mini(noise={"full_well": 1000.0, "gain": 2.0})
     image = OpticalModel(design).render((), (80, 60), photons=50_000, seed=4)

@@ -36,7 +36,7 @@ pixels over 60 degrees, 0.1 degrees, large against the rounding of directions (1
 
 LARGEST = 10.0
 """Upper bound on the vergence (1/mm), that of a distance of a tenth of a millimetre, at which no
-sensor has its skin. Larger values come from rays that meet another part than their neighbours."""
+sensor has its skin. Larger values come from rays of nearly the same end point."""
 
 FOCUS_ACROSS = 64
 """Number of places across the picture at which the apparent distance is computed: each stands for
@@ -70,8 +70,8 @@ def apparent_vergences(scene: RayScene, camera: RayCamera) -> FloatArray:
     negative if the rays from the point converge towards the pupil.
 
     Distances are measured along the axis for perspective lenses, whose field of focus is flat, and
-    along the ray for fisheyes. Pixels that do not see the skin get the values of the nearest one
-    that does.
+    along the ray for fisheyes. Pixels that do not see the skin, or see it over an edge, where the
+    rays of a pixel meet different surfaces, get the values of the nearest one that does.
 
     Args:
         camera: the camera whose pixels are evaluated.
@@ -85,15 +85,16 @@ def apparent_vergences(scene: RayScene, camera: RayCamera) -> FloatArray:
     origin, direction = _rays(camera, x, y)
     turned = [_rays(camera, x + FILM_SHIFT, y)[1], _rays(camera, x, y + FILM_SHIFT)[1]]
     right, up, forward = camera.axes()
-    seen, points = trace_to_skin(scene, origin, direction)
+    path, points = trace_to_skin(scene, origin, direction)
+    seen = path != 0
     by_film, by_pupil = [], []
     for way in turned:
-        there, moved = trace_to_skin(scene, origin, way)
-        seen &= there
+        other, moved = trace_to_skin(scene, origin, way)
+        seen &= other == path
         by_film.append((moved - points) / FILM_SHIFT)
     for shift in (right, up):
-        there, moved = trace_to_skin(scene, origin + PUPIL_SHIFT * shift, direction)
-        seen &= there
+        other, moved = trace_to_skin(scene, origin + PUPIL_SHIFT * shift, direction)
+        seen &= other == path
         by_pupil.append((moved - points) / PUPIL_SHIFT)
     turning = np.stack([(way - direction) / FILM_SHIFT for way in turned], axis=-1)
     across = (

@@ -118,43 +118,43 @@ def _trace(scene: RayScene, patches: mi.UInt32 | None, ray: Ray) -> tuple[Any, .
 def trace_path_codes(
     scene: RayScene, camera: RayCamera, x: NDArray[np.floating], y: NDArray[np.floating]
 ) -> NDArray[np.uint32]:
-    """Return a code for the path of each chief ray.
-
-    The code is a hash of the smooth patches that the ray meets, in order, and of its total
-    reflections. Between rays of the same code the path changes smoothly.
+    """Return the codes (k,) of the paths of chief rays, as `trace_to_skin` does.
 
     Args:
         x, y: (k,) film positions, pixels.
-
-    Returns:
-        The codes (k,): 0 for rays that do not arrive at the sensing surface, and never 0 for the
-        others.
     """
-    traced = _trace(scene, scene.patches, Ray(*camera.rays(floats(x), floats(y)), mi.Bool(True)))
-    outcome, path = traced[0], traced[-1]
-    codes = dr.select(outcome == int(RayOutcome.HIT), path | 1, 0)
-    return np.asarray(codes).astype(np.uint32)
+    return _coded(scene, Ray(*camera.rays(floats(x), floats(y)), mi.Bool(True)))[0]
 
 
 def trace_to_skin(
     scene: RayScene, origin: NDArray[np.floating], direction: NDArray[np.floating]
-) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+) -> tuple[NDArray[np.uint32], NDArray[np.float64]]:
     """Follow rays from given origins to the sensing surface.
+
+    The code of a path is a hash of the smooth patches that the ray meets, in order, and of its
+    total reflections. Between rays of the same code the path changes smoothly.
 
     Args:
         origin: (k, 3) origins, mm.
         direction: (k, 3) unit directions.
 
     Returns:
-        A mask (k,) of the rays that arrive at the sensing surface, and their end points (k, 3), mm.
+        The codes (k,), 0 for rays that do not arrive at the sensing surface, and never 0 for the
+        others; and the end points (k, 3), mm.
     """
     start, way = (
         dr.unravel(kind, floats(each.ravel()))
         for kind, each in ((mi.Point3f, origin), (mi.Vector3f, direction))
     )
-    outcome, point = _trace(scene, None, Ray(start, way, mi.Bool(True)))[:2]
-    hit = np.asarray(outcome) == int(RayOutcome.HIT)
-    return hit, np.asarray(point, dtype=np.float64).T
+    codes, point = _coded(scene, Ray(start, way, mi.Bool(True)))
+    return codes, np.asarray(point, dtype=np.float64).T
+
+
+def _coded(scene: RayScene, ray: Ray) -> tuple[NDArray[np.uint32], mi.Point3f]:
+    outcome, point, *_others, path = _trace(scene, scene.patches, ray)
+    codes = dr.select(outcome == int(RayOutcome.HIT), path | 1, 0)
+    dr.eval(codes, point)
+    return np.asarray(codes).astype(np.uint32), point
 
 
 def trace_chief_rays(
