@@ -153,22 +153,52 @@ def _noise(section: dict[str, Any], black_level: dict[str, float] | None) -> dic
 
 
 def _shading(section: dict[str, Any], temperature: float) -> dict[str, Any]:
-    if "luminance_lut" not in section:
-        return {}
-    strength = min(max(_number(section.get("luminance_strength", 1.0)), 0.0), 1.0)
-    shading: dict[str, Any] = {
-        "kind": "table",
-        "corrected": strength,
-        "gain": _table(section["luminance_lut"]),
-    }
+    """Return the shading. Like libcamera, it prefers a corner strength to a table of luminance, and
+    takes a luminance of 1 where there is neither.
+    """
+    colours: dict[str, list[list[float]]] = {}
     for colour, name in (("red", "calibrations_Cr"), ("blue", "calibrations_Cb")):
         tables = section.get(name) or []
         if tables:
             nearest = min(tables, key=lambda each: abs(_number(each["ct"]) - temperature))
             table = np.array(_table(nearest["table"]))
-            shading[colour] = np.round(table / table.min(), ROUNDING - 1).tolist()
-            shading["colour_corrected"] = 1.0
+            colours[colour] = np.round(table / table.min(), ROUNDING - 1).tolist()
+    size = np.shape(next(iter(colours.values()))) if colours else TABLE_SIZES[192]
+    if "corner_strength" in section:
+        gain = _corner_gain(section, size)
+    elif "luminance_lut" in section:
+        gain = _table(section["luminance_lut"])
+    elif colours:
+        gain = np.ones(size).tolist()
+    else:
+        return {}
+    strength = min(max(_number(section.get("luminance_strength", 1.0)), 0.0), 1.0)
+    shading: dict[str, Any] = {"kind": "table", "corrected": strength, "gain": gain, **colours}
+    if colours:
+        shading["colour_corrected"] = 1.0
     return {"shading": shading}
+
+
+def _corner_gain(section: dict[str, Any], size: tuple[int, ...]) -> list[list[float]]:
+    """Return the table of some rows and columns that libcamera makes from the gain in the corners.
+
+    The gain undoes the fourth power of the cosine of the angle from the axis, 1 / (1 + tan²)². It
+    is (1 + (√c - 1) r²)², with the gain c in the corners and the distance r from the middle, about
+    1 in the corners. Distances across are multiplied by the asymmetry.
+    """
+    strength = _number(section["corner_strength"])
+    asymmetry = _number(section.get("asymmetry", 1.0))
+    if strength <= 1.0:
+        raise LibraryError(f"the corner strength is {strength:g}, and not above 1")
+    if asymmetry < 0.0:
+        raise LibraryError(f"the asymmetry is {asymmetry:g}, and below 0")
+    rows, columns = size
+    down = np.arange(rows)[:, None] + 0.5 - rows / 2
+    across = asymmetry * (np.arange(columns) + 0.5 - columns / 2)
+    square = (down**2 + across**2) / (rows * columns / 4 * (1.0 + asymmetry**2))
+    gain = (1.0 + (np.sqrt(strength) - 1.0) * square) ** 2
+    table: list[list[float]] = np.round(gain, ROUNDING).tolist()
+    return table
 
 
 def _table(numbers: Any) -> list[list[float]]:

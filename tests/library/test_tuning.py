@@ -103,6 +103,26 @@ def without(key: str, **changes: Any) -> dict[str, Any]:
     return content
 
 
+def test_the_luminance_is_that_of_libcamera_whatever_the_file_has_of_it(tmp_path: Path) -> None:
+    """A corner strength of 4 makes the table (1 + r²)² and precedes `luminance_lut`."""
+
+    def shading(content: dict[str, Any]) -> Any:
+        return read_tuning(write(tmp_path, content)).values.get("shading")
+
+    made = shading(without("rpi.alsc", corner_strength=4.0))
+    assert made["gain"][0][0] == pytest.approx((1.0 + (5.5**2 + 7.5**2) / 96.0) ** 2, abs=1e-5)
+    content = without("rpi.alsc", corner_strength=4.0, asymmetry=0.5)
+    del content["rpi.alsc"]["luminance_lut"]
+    narrow = shading(content)
+    assert narrow["gain"][-1][-1] == pytest.approx((1.0 + (5.5**2 + 3.75**2) / 60.0) ** 2, abs=1e-5)
+    del content["rpi.alsc"]["corner_strength"]
+    even = shading(content)
+    assert np.array(even["gain"]) == pytest.approx(np.ones((12, 16)))
+    assert even["red"] == narrow["red"] == made["red"] and made["colour_corrected"] == 1.0
+    del content["rpi.alsc"]["calibrations_Cr"]
+    assert shading(content) is None
+
+
 @pytest.mark.parametrize(
     ("content", "says"),
     [
@@ -119,6 +139,8 @@ def without(key: str, **changes: Any) -> dict[str, Any]:
         ({"rpi.black_level": {"black_level": "dark"}}, "'dark' is no number"),
         (without("rpi.alsc", luminance_lut=[1.0] * 190), "a shading table has 190 numbers"),
         (without("rpi.alsc", luminance_lut=[-1.0] * 192), "the gain -1"),
+        (without("rpi.alsc", corner_strength=1.0), "the corner strength is 1, and not above 1"),
+        (without("rpi.alsc", corner_strength=2.0, asymmetry=-1.0), "the asymmetry is -1"),
         (without("rpi.contrast", gamma_curve=[0, 0, 1]), "'rpi.contrast' is not as in"),
         (without("rpi.awb", ct_curve=[5000, 1, 1, 3000, 1, 1]), "does not rise"),
         (without("rpi.ccm", ccms=[]), "'rpi.ccm' is not as in"),
