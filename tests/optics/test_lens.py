@@ -12,7 +12,7 @@ import pytest
 
 import optisense as ots
 from optisense import library
-from optisense.design import SensorDesign
+from optisense.design import SensorDesign, _focus_checks
 from optisense.design.lenses import LensDistortion
 from optisense.design.lenses.blur import Defocus
 from optisense.design.lenses.film import PictureWindow
@@ -196,13 +196,13 @@ def traced_blur(model: OpticalModel, x: float, y: float) -> float:
     return float(np.sqrt(found.var(axis=1).mean()))
 
 
-def behind_a_wedge() -> SensorDesign:
-    """Mini with the camera's side of its acrylic at 20 degrees, at the mean focus on the axis."""
+def behind_a_wedge(tilt: float = 20.0) -> SensorDesign:
+    """Mini with the camera's side of its acrylic inclined, near the mean focus on the axis."""
     lens = {"kind": "defocus", "focal_length": 3.04, "f_number": 2.0, "focus_distance": 19.1}
     design = mini(blur=lens)
     corners = design.meshes["guide"].vertices.copy()
     back = np.isclose(corners[:, 2], corners[:, 2].min())
-    corners[back, 2] += np.tan(np.radians(20.0)) * corners[back, 0]
+    corners[back, 2] += np.tan(np.radians(tilt)) * corners[back, 0]
     design.meshes["guide"] = replace(design.meshes["guide"], vertices=corners)
     return design
 
@@ -235,6 +235,15 @@ def test_what_is_in_focus_stays_sharp_and_what_is_not_is_blurred() -> None:
     plain, sharp, soft = (contrast(focus) for focus in (None, 19.36, 12.0))
     assert sharp > 0.9 * plain
     assert soft < 0.6 * plain
+
+
+def test_the_check_of_the_focus_knows_where_the_skin_appears_behind_a_wedge() -> None:
+    design = behind_a_wedge(35.0)
+    model = OpticalModel(design)
+    traced = apparent_vergences(model.scenes.fine.scene, model.camera((32, 24)))
+    straight = _focus_checks.apparent_vergences(design, design.deformed_meshes())
+    found, true = (np.median(each.mean(axis=-1)) for each in (straight, traced))
+    assert found == pytest.approx(true, rel=0.015)
 
 
 def test_rays_that_meet_different_surfaces_do_not_count_as_blur() -> None:
