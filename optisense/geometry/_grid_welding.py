@@ -12,9 +12,9 @@ coordinates in mesh files of single precision."""
 
 def welded(
     vertices: NDArray[np.float64], faces: NDArray[np.int32], distance: float
-) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
     """Merge vertices (n, 3) that agree to a distance, the side of the grid's cells, and drop faces
-    (m, 3) that collapse; return the remaining vertices, in their old order, and faces.
+    (m, 3) that collapse; return the numbers (k,) of the remaining vertices, ascending, and faces.
     """
     cells = np.round(vertices / distance).astype(np.int64)
     order = np.lexsort(cells.T)  # several times faster than sorting whole rows
@@ -26,7 +26,7 @@ def welded(
     number[order] = rank[np.cumsum(begins) - 1]
     merged = number[faces]
     whole = (merged != np.roll(merged, 1, axis=1)).all(axis=1)
-    return vertices[np.sort(first)], merged[whole]
+    return np.sort(first), merged[whole]
 
 
 def first_faces(faces: NDArray[np.integer], count: int) -> NDArray[np.int64]:

@@ -286,9 +286,11 @@ class TriangleMesh:
         """Return the mesh with vertices that agree to `distance` (mm) merged, and without faces
         that collapse.
 
-        Shading normals are dropped.
+        Shading normals are dropped; `rest` is welded alike.
         """
-        return TriangleMesh(*welded(self.vertices, self.faces, distance))
+        kept, faces = welded(self.vertices, self.faces, distance)
+        rest = None if self.rest is None else TriangleMesh(self.rest.vertices[kept], faces)
+        return TriangleMesh(self.vertices[kept], faces, rest=rest)
 
     def with_winding_from_normals(self) -> TriangleMesh:
         """Return the mesh with the faces reversed whose normals oppose their shading normals."""

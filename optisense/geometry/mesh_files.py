@@ -84,14 +84,14 @@ def read_mesh(path: Path) -> MeshArrays:
         )
     apart = mesh.normals is None and len(mesh.vertices) == 3 * len(mesh.faces)
     if apart and np.isfinite(far).all():  # as in all STL files, which have no common vertices
-        whole = MeshArrays(*welded(mesh.vertices, mesh.faces, WELD_DISTANCE))
-        if len(mesh.faces) and not len(whole.faces):
+        kept, faces = welded(mesh.vertices, mesh.faces, WELD_DISTANCE)
+        if len(mesh.faces) and not len(faces):
             raise MeshError(
                 f"all triangles of the mesh collapse: they are smaller than {WELD_DISTANCE:g}",
                 where=str(path),
                 hint="Check the unit of the file, or export it again",
             )
-        mesh = whole
+        mesh = MeshArrays(mesh.vertices[kept], faces)
     if len(mesh.faces) == 0:
         raise MeshError(
             "the mesh file has no triangles", where=str(path), hint="Export a surface, not points"

@@ -63,7 +63,10 @@ def test_a_deformed_crease_remains_sharp() -> None:
     points[0] += 0.001
     bent = deformed(roof, box, (3, 3, 3), points)
     mirrored = bent.transformed(np.diag([1.0, 1.0, -1.0]))
-    for mesh in (bent, bent.deformed(1.1 * bent.vertices), bent.flipped(), mirrored):
+    again = bent.deformed(1.1 * bent.vertices)
+    halves = [bent.with_faces(bent.faces[k::2]).compacted() for k in range(2)]
+    whole = TriangleMesh.joined(halves).welded()
+    for mesh in (bent, again, bent.flipped(), mirrored, whole):
         assert len(mesh.vertex_normals().vertices) == len(roof.vertices) + 5
     assert bent.rest is not roof  # which is a weak key of caches that hold deformed meshes
     pair = TriangleMesh.joined([bent, roof.with_faces(roof.faces[::2])]).compacted()
