@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.array_types import BoolArray, FloatArray, IntArray
+from optisense.geometry._grid_welding import WELD_DISTANCE, distinct
 from optisense.geometry.connected import connected_components
 from optisense.geometry.patches import inner_edges
-from optisense.geometry.shading_normals import CREASE
+from optisense.geometry.shading_normals import CREASE, SAME_NORMAL
 
 if TYPE_CHECKING:
     from optisense.geometry.mesh import TriangleMesh
@@ -104,6 +105,23 @@ def divided_at_creases(
     old = faces.ravel()[corners[first]]
     faces.ravel()[corners] = len(own) + group
     return faces, np.concatenate([own, old])
+
+
+def divided_by_normals(
+    mesh: TriangleMesh,
+) -> tuple[NDArray[np.integer], NDArray[np.integer]]:
+    """Divide the vertices of a mesh where its shading normals differ, and nowhere else.
+
+    Args:
+        mesh: a mesh with normals, whose faces need not share vertices.
+
+    Returns:
+        See `divided_at_creases`.
+    """
+    assert mesh.normals is not None
+    corners = np.hstack([mesh.vertices / WELD_DISTANCE, mesh.normals / SAME_NORMAL])
+    first, number = distinct(corners, 1.0)
+    return number[mesh.faces], first
 
 
 def _curved(

@@ -16,17 +16,27 @@ def welded(
     """Merge vertices (n, 3) that agree to a distance, the side of the grid's cells, and drop faces
     (m, 3) that collapse; return the numbers (k,) of the remaining vertices, ascending, and faces.
     """
-    cells = np.round(vertices / distance).astype(np.int64)
+    kept, number = distinct(vertices, distance)
+    merged = number[faces]
+    whole = (merged != np.roll(merged, 1, axis=1)).all(axis=1)
+    return kept, merged[whole]
+
+
+def distinct(
+    points: NDArray[np.float64], distance: float
+) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+    """Return the numbers (k,), ascending, of the first of all points (n, d) in each cell of a grid,
+    whose cells have the side `distance`, and for each point (n,) the row of its cell's in these.
+    """
+    cells = np.round(points / distance).astype(np.int64)
     order = np.lexsort(cells.T)  # several times faster than sorting whole rows
     begins = np.ones(len(cells), dtype=bool)
     begins[1:] = (np.diff(cells[order], axis=0) != 0).any(axis=1)
     first = order[begins]
-    rank = np.argsort(np.argsort(first))  # keep the vertices in their old order
+    rank = np.argsort(np.argsort(first))  # keep the points in their old order
     number = np.empty(len(cells), dtype=np.int32)
     number[order] = rank[np.cumsum(begins) - 1]
-    merged = number[faces]
-    whole = (merged != np.roll(merged, 1, axis=1)).all(axis=1)
-    return np.sort(first), merged[whole]
+    return np.sort(first), number
 
 
 def first_faces(faces: NDArray[np.integer], count: int) -> NDArray[np.int64]:

@@ -260,7 +260,8 @@ class TriangleMesh:
 
     def deformed(self, vertices: FloatArray) -> TriangleMesh:
         """Return the mesh with its vertices moved to (n, 3), mm; shading normals are dropped, and
-        its creases remain sharp however the faces beside them bend.
+        edges at which they differ, or else creases, remain sharp however the faces beside them
+        bend.
         """
         return TriangleMesh(vertices, self.faces, rest=self.rest or self._as_rest)
 
@@ -302,7 +303,8 @@ class TriangleMesh:
 
     def vertex_normals(self) -> TriangleMesh:
         """Return the mesh with smooth shading normals, kept apart across edges of more than 40
-        degrees and across creases between flat faces; see `_creases`.
+        degrees and across creases: edges at which its own normals differ or, without these, bends
+        between flat faces; see `_creases`.
 
         Vertices are split where their corners disagree; see `shading_normals`.
         """
@@ -310,19 +312,21 @@ class TriangleMesh:
 
     @cached_property
     def _as_rest(self) -> TriangleMesh:
-        """The shape alone, so that deformed meshes keep no reference to a mesh that is no more
-        used: caches by mesh, which hold deformed ones, would never be freed.
+        """A copy, so that deformed meshes keep no reference to a mesh that is no more used: caches
+        by mesh, which hold deformed ones, would never be freed.
         """
-        return TriangleMesh(self.vertices, self.faces)
+        return replace(self)
 
     @cached_property
     def _divided(self) -> tuple[NDArray[np.integer], NDArray[np.integer]]:
         """Faces (m, 3) whose vertices are divided along creases, and the number (k,) in `vertices`
-        of each of these.
+        of each of these. With shading normals, creases are where these differ.
         """
-        from optisense.geometry._creases import divided_at_creases
+        from optisense.geometry._creases import divided_at_creases, divided_by_normals
 
-        return divided_at_creases(self) if self.rest is None else self.rest._divided
+        if self.rest is not None:
+            return self.rest._divided
+        return divided_at_creases(self) if self.normals is None else divided_by_normals(self)
 
     @cached_property
     def _smooth(self) -> TriangleMesh:

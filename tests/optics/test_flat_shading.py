@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from optisense.geometry import TriangleMesh
+from optisense.geometry import TriangleMesh, cage_points
+from optisense.geometry.cage import deformed
 from optisense.optics.scene.assembly import AssemblyCache
 from optisense.optics.scene.surfaces import Surface, SurfaceKind
 from optisense.sensors._shapes import arc, ribbon
@@ -20,6 +21,26 @@ def test_facets_with_their_own_normals_remain_flat() -> None:
         assert len(mesh.faces) == 10
         piece = cache.piece("mirror", mesh, Surface(SurfaceKind.MIRROR))
         assert (piece.normals is None) == flat
+
+
+def test_facets_with_their_own_normals_remain_apart_in_a_cage() -> None:
+    sheet = ribbon(arc((0.0, 0.0), 5.0, 0.0, 90.0, 5), 3.0, 4)
+    corners = sheet.triangles.reshape(-1, 3)
+    faces = np.arange(len(corners)).reshape(-1, 3)
+    mesh = TriangleMesh(corners, faces, np.repeat(sheet.face_normals, 3, axis=0))
+    box = mesh.bounds + [[-1.0], [1.0]]
+    points = cage_points(box, (3, 3, 3))
+    for moved, most in ((0.0, 0.0), (0.5, 1.5)):
+        points[13] += moved
+        cache = AssemblyCache()
+        merged = cache.merge(deformed(mesh, box, (3, 3, 3), points))
+        piece = cache.piece("mirror", merged, Surface(SurfaceKind.MIRROR))
+        assert (piece.normals is None) == (moved == 0.0)
+        if piece.normals is not None:
+            whole = TriangleMesh(piece.vertices, piece.faces)
+            cosine = np.einsum("fci,fi->fc", piece.normals[piece.faces], whole.face_normals)
+            assert cosine.min() > np.cos(np.radians(most))  # 9 degrees if facets were smoothed
+            assert len(piece.vertices) == 5 * 10
 
 
 def test_facets_with_vertices_of_their_own_but_without_normals_are_smooth() -> None:

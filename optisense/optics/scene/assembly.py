@@ -295,7 +295,7 @@ def _merged(mesh: TriangleMesh) -> TriangleMesh:
     if _is_flat(_shaded(merged)):
         return merged
     # Vertices that are split without normals say nothing about the edges between their faces.
-    if mesh.normals is None and not _is_flat(mesh.welded().vertex_normals()):
+    if (mesh.rest or mesh).normals is None and not _is_flat(mesh.welded().vertex_normals()):
         return merged
     corners = merged.triangles.reshape(-1, 3)
     own = np.repeat(merged.face_normals, 3, axis=0)
