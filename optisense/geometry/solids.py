@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from optisense.array_types import FloatArray
+from optisense.geometry._grid_welding import WELD_DISTANCE, distinct
 from optisense.geometry.coincidence import boxes_overlap
 from optisense.geometry.containment import inside
 from optisense.geometry.mesh import TriangleMesh
@@ -63,6 +64,47 @@ def of_manifold(solid: Any) -> TriangleMesh:
     """Return a manifold3d object as a mesh."""
     mesh = solid.to_mesh64()
     return TriangleMesh(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts))
+
+
+def cut_out(mesh: TriangleMesh, tool: TriangleMesh) -> TriangleMesh:
+    """Return a closed mesh without the space that it shares with another one, which may be empty.
+
+    Shading normals are kept, and a deformed mesh gets those of its shape before the cut, after
+    which its shape at rest would no more be known.
+    """
+    if mesh.normals is None and mesh.rest is None:
+        return of_manifold(as_manifold(mesh) - as_manifold(tool))
+    first, second = (
+        each if each.normals is not None else each.vertex_normals() for each in (mesh, tool)
+    )
+    assert first.normals is not None and second.normals is not None
+    solid = _with_properties(first, first.normals) - _with_properties(second, -second.normals)
+    cut = solid.to_mesh64()
+    vertices, normals = np.split(np.asarray(cut.vert_properties), [3], axis=1)
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = normals / np.maximum(length, np.finfo(np.float64).tiny)
+    return TriangleMesh(vertices, np.asarray(cut.tri_verts), normals)
+
+
+def _with_properties(mesh: TriangleMesh, properties: FloatArray) -> Any:
+    """Return a mesh as a manifold3d object that interpolates properties (n, k) of its vertices,
+    which may differ where these coincide.
+    """
+    import manifold3d
+
+    first, number = distinct(mesh.vertices, WELD_DISTANCE)
+    same = first[number]
+    again = np.flatnonzero(same != np.arange(len(same))).astype(np.uint64)
+    merged = same[mesh.faces]
+    whole = (merged != np.roll(merged, 1, axis=1)).all(axis=1)
+    return manifold3d.Manifold(
+        manifold3d.Mesh64(
+            np.hstack([mesh.vertices, properties]),
+            mesh.faces[whole].astype(np.uint64),
+            merge_from_vert=again,
+            merge_to_vert=same[again].astype(np.uint64),
+        )
+    )
 
 
 def without(first: TriangleMesh, second: TriangleMesh) -> TriangleMesh:

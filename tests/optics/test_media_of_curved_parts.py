@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from media_chain import ACRYLIC, GEL, area, box, check_chain, first_of
 
-from optisense.geometry import TriangleMesh
+from optisense.geometry import TriangleMesh, cage_points
+from optisense.geometry.cage import deformed
 from optisense.geometry.rays import ray_hits
 from optisense.optics.scene.media import Media, Sheet, Solid
 
@@ -126,3 +127,25 @@ def test_shading_normals_live_on_in_cut_faces() -> None:
         if face.names[0] == "core":
             assert face.mesh.normals is not None
             np.testing.assert_allclose(np.linalg.norm(face.mesh.normals, axis=1), 1.0)
+
+
+def test_creases_and_normals_of_solids_live_on_where_others_reach_into_them() -> None:
+    block = box((-6, -5, 0), (6, 5, 1), (4, 4, 2))
+    x, y, z = block.vertices.T
+    heights = z * (3 + (6 - np.abs(x)) * np.tan(np.radians(10)))
+    roof = block.with_vertices(np.column_stack([x, y, heights]))
+    around = roof.bounds + [[-1.0], [1.0]]
+    points = cage_points(around, (3, 3, 3))
+    points[13] += 0.3
+    bent = deformed(roof, around, (3, 3, 3), points)
+    corners = bent.triangles.reshape(-1, 3)
+    own = np.repeat(bent.face_normals, 3, axis=0)
+    facets = TriangleMesh(corners, np.arange(len(corners)).reshape(-1, 3), own)
+    bead = Solid("bead", box((-1, -1, -1), (1, 1, 1)), "glass", 1.52, priority=1)
+    for mesh, most in ((bent, 2.0), (facets, 1e-4)):
+        interfaces = Media([Solid("roof", mesh, "silicone", GEL), bead]).interfaces
+        outside = next(face.mesh for face in interfaces if face.names == ("roof",))
+        assert area(interfaces, "bead", "roof") > 4.0 and outside.normals is not None
+        normals = outside.normals[outside.faces]
+        cosine = np.einsum("fci,fi->fc", normals, outside.face_normals)
+        assert cosine.min() > np.cos(np.radians(most))  # 10 degrees if the ridge was smoothed

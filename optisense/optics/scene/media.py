@@ -29,7 +29,7 @@ from optisense.geometry.coincidence import Overlay, boxes_overlap, cut, find_coi
 from optisense.geometry.connected import connected_components
 from optisense.geometry.mesh import TriangleMesh
 from optisense.geometry.mesh_points import Anchors, anchored
-from optisense.geometry.solids import as_manifold, of_manifold, thick_place
+from optisense.geometry.solids import as_manifold, cut_out, thick_place
 from optisense.optics.scene._solids import AROUND, Interface, Sheet, Solid
 
 CUT_CLEARANCE = 2e-5
@@ -293,8 +293,8 @@ def _disjoint(solids: list[Solid]) -> list[Solid]:
                 hint="move them apart, or give the part that fills the common space the "
                 "larger priority",
             )
-        larger = _manifold(_grown(result[i], CUT_CLEARANCE))
-        result[j] = replace(result[j], mesh=of_manifold(_manifold(result[j]) - larger))
+        larger = _grown(result[i], CUT_CLEARANCE)
+        result[j] = replace(result[j], mesh=cut_out(result[j].mesh, larger.mesh))
     return [solid for solid in result if len(solid.mesh.faces)]
 
 
