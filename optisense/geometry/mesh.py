@@ -194,7 +194,7 @@ class TriangleMesh:
         """The edges (n, 2) by their vertices, ascending, and the number (n,) of faces of each."""
         sides, order = self._sorted_sides
         ascending = sides[order]
-        first = np.flatnonzero(np.diff(ascending, prepend=-1))
+        first = np.flatnonzero(np.diff(ascending, prepend=-1) != 0)
         ends = np.divmod(ascending[first], len(self.vertices))
         return np.column_stack(ends).astype(np.int32), np.diff(first, append=len(ascending))
 
