@@ -179,8 +179,10 @@ def cut(mesh: TriangleMesh, overlays: list[Overlay]) -> list[TriangleMesh]:
     that nothing covers; where several overlays overlap, the first one counts.
 
     Together the parts form the mesh; completely covered or free faces are kept, others are cut.
+    Shading normals are kept, and a deformed mesh gets those of its shape before the cut, as in
+    `solids.cut_out`.
     """
-    state = _Remainder(mesh)
+    state = _Remainder(mesh if mesh.rest is None else mesh.vertex_normals())
     return [*(state.take(overlay) for overlay in overlays), state.rest()]
 
 
