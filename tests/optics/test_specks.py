@@ -13,6 +13,7 @@ from optisense.design import AreaEmitter, Dielectric, Light, SensorDesign
 from optisense.design.reflectance import fresnel_dielectric, ggx_density, smith_shadowing
 from optisense.geometry import Contact, Sphere, TriangleMesh
 from optisense.optics import OpticalModel
+from optisense.optics.imaging import lamp_images
 from optisense.optics.imaging.lamp_images import without_specks
 
 WIDTH, HEIGHT = 80, 60
@@ -104,7 +105,7 @@ class TestGlare:
     absorbed; what the other faces of the guide send back adds 2 %.
     """
 
-    ALPHA, LAMP, SIDE = 0.3, (9.0, 2.0, -25.0), 4.0
+    LAMP, SIDE = (9.0, 2.0, -25.0), 4.0
     SIZE = 64, 48
     MEAN_ERROR = 0.07
     """Relative error of the mean: these 2 %, and four standard errors."""
@@ -112,7 +113,23 @@ class TestGlare:
     """Mean difference of pixels, relative to the mean: twice the noise of the glare; that of single
     samples that meet the lamp is 2."""
 
-    def expected(self, design: SensorDesign) -> NDArray[np.float64]:
+    def design(self, alpha: float) -> SensorDesign:
+        """Return the sensor whose face has this roughness."""
+        design = sensors.gelsight_mini_ideal()
+        design = ots.set_value(design, "coating.reflectance", (0.0, 0.0, 0.0))
+        faces = {"low": {"direction": (0, 0, -1), "within": 10, "roughness": alpha}}
+        design = ots.set_value(design, "parts.guide.faces", faces)
+        group = design.lights["green"]
+        group.emitter = AreaEmitter(shape="rectangle", size=(self.SIDE, self.SIDE))
+        group.lights = [Light(position=self.LAMP, direction=(0.0, 0.0, 1.0))]
+        return design
+
+    def glare(self, design: SensorDesign) -> NDArray[np.float32]:
+        """Return the radiance (h, w) in an image."""
+        image = OpticalModel(design).render([], self.SIZE, 10_000)
+        return image.unit_layers["green"][..., 1]
+
+    def expected(self, design: SensorDesign, alpha: float) -> NDArray[np.float64]:
         """Return the radiance (h, w) of the face for a lamp of 1 mW."""
         width, height = self.SIZE
         rows, columns = np.indices((height, width)) + 0.5
@@ -132,8 +149,8 @@ class TestGlare:
             half = (light + view) / np.linalg.norm(light + view, axis=0)
             cosine, towards = -light[2], -view[2]
             brdf = fresnel_dielectric((half * view).sum(axis=0), self.index(design))
-            brdf *= ggx_density(-half[2], self.ALPHA) * smith_shadowing(cosine, self.ALPHA)
-            brdf *= smith_shadowing(towards, self.ALPHA) / (4 * cosine * towards)
+            brdf *= ggx_density(-half[2], alpha) * smith_shadowing(cosine, alpha)
+            brdf *= smith_shadowing(towards, alpha) / (4 * cosine * towards)
             total += brdf * cosine * cosine / distance**2
         return total / steps.size**2 / np.pi
 
@@ -143,19 +160,16 @@ class TestGlare:
         assert isinstance(guide, Dielectric)
         return guide.ior
 
-    def test_is_smooth_and_none_is_lost(self) -> None:
-        design = sensors.gelsight_mini_ideal()
-        design = ots.set_value(design, "coating.reflectance", (0.0, 0.0, 0.0))
-        faces = {"low": {"direction": (0, 0, -1), "within": 10, "roughness": self.ALPHA}}
-        design = ots.set_value(design, "parts.guide.faces", faces)
-        group = design.lights["green"]
-        group.emitter = AreaEmitter(shape="rectangle", size=(self.SIDE, self.SIDE))
-        group.lights = [Light(position=self.LAMP, direction=(0.0, 0.0, 1.0))]
-        image = OpticalModel(design).render([], self.SIZE, 10_000)
-        glare = image.unit_layers["green"][..., 1]
-        expected = self.expected(design)
+    @pytest.mark.parametrize("alpha", [0.05, 0.3])
+    def test_is_smooth_and_none_is_lost(
+        self, alpha: float, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        design = self.design(alpha)
+        glare, expected = self.glare(design), self.expected(design, alpha)
         assert glare.mean() == pytest.approx(expected.mean(), rel=self.MEAN_ERROR)
         assert np.abs(glare - expected).mean() < self.NOISE * expected.mean()
+        monkeypatch.setattr(lamp_images, "GLARE_WIDTHS", (0.0,))  # no pixels are averaged
+        assert glare.sum() == pytest.approx(self.glare(design).sum(), rel=1e-5)
 
 
 def steep() -> SensorDesign:

@@ -45,7 +45,7 @@ which is about 0.01."""
 GLARE_EDGE = 4.0
 """Difference between the averages with two kernels, in standard errors, above which glare counts as
 sharp and has the narrower one, if as many of these errors are less than the glare. Where a face of
-roughness 0.01 shows the outline of a lamp, the glare is 2 % too bright without it."""
+roughness 0.01 shows the outline of a lamp, the mean error of pixels is then 6 instead of 9 %."""
 GLARE_WIDTHS = 1 / 16, 1 / 32, 1 / 64, 1 / 128, 0.0
 """Half widths of the kernels that average glare, as fractions of the image width. Each pixel has
 the narrowest with which its noise is low. The widest leaves a noise of 3 % of the glare that a wide
@@ -185,15 +185,16 @@ def _steadied(
     layers: NDArray[np.float32], variance: NDArray[np.float32], region: NDArray[np.bool_]
 ) -> NDArray[np.float32]:
     """Return layers (groups, h, w, 3), each pixel of a region (h, w) of which is averaged over as
-    many others of the region around it as its noise requires.
+    many others of the region around it as its noise requires. The sum of a group does not change.
     """
     # The noise with a kernel is known from the averages with the next wider one: if it were known
     # from its own, pixels that are too bright by chance would be averaged less.
     samples = region.astype(np.float32)
+    reaches = [round(width * layers.shape[2]) | 1 for width in GLARE_WIDTHS]
     found, steady = layers, np.broadcast_to(region, layers.shape[:3])
+    kernel = np.zeros(steady.shape, dtype=np.uint8)
     wider, square = layers, np.zeros_like(layers)
-    for width in GLARE_WIDTHS:
-        reach = round(width * layers.shape[2]) | 1
+    for number, reach in enumerate(reaches):
         mean, spread = layers.copy(), variance.copy()
         if reach > 1:
             average_pixels(mean, samples, region, reach, deblurred=True)
@@ -205,8 +206,22 @@ def _steadied(
         apart = np.abs(mean.sum(axis=-1) - bright) > GLARE_EDGE * error
         steady = steady & ((error <= GLARE_NOISE * bright) | apart & (error <= bright / GLARE_EDGE))
         found = np.where(steady[..., None], mean, found)
+        kernel[steady] = number
         wider, square = mean, spread
-    return found
+
+    # A pixel with a wide kernel beside a sharp spot takes light that the spot keeps, too. Where
+    # kernels differ, what a pixel has too much is taken from those over which it was averaged.
+    lost = layers - found
+    for number, reach in enumerate(reaches):
+        near = averaged_twice(samples, reach)
+        share = np.divide(1, near, out=np.zeros_like(near), where=region)
+        for layer, back, chosen in zip(found, lost, kernel == number, strict=True):
+            beside = chosen & ndimage.maximum_filter(region & ~chosen, 2 * reach - 1)
+            for k in range(3):
+                layer[..., k] += averaged_twice(back[..., k] * beside * share, reach) * samples
+    np.maximum(found, 0, out=found)  # adds light, which the factor below removes
+    total, kept = (each.sum(axis=(1, 2, 3), keepdims=True) for each in (layers, found))
+    return found * np.divide(total, kept, out=np.ones_like(kept), where=kept > 0)
 
 
 def without_specks(
