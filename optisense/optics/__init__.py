@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 from optisense.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
-    from optisense.optics._model import OpticalModel, RenderProgress
+    from optisense.optics._model import OpticalModel
+    from optisense.optics.backend.stages import RenderProgress
     from optisense.optics.drafts import CoarseModel
     from optisense.optics.imaging.tactile_image import TactileImage
     from optisense.optics.ledger import LightLedger, light_ledger

@@ -22,7 +22,7 @@ from optisense.optics._render_settings import check_choices, check_pixels, numbe
 from optisense.optics._skin_view import VIEW_ACROSS, SkinView
 from optisense.optics.backend.interrupts import reraise_interrupts
 from optisense.optics.backend.memory import bound_memory
-from optisense.optics.backend.stages import Stage, StageCallback, fraction_done
+from optisense.optics.backend.stages import RenderProgress, Stage, StageCallback, stage_callback
 from optisense.optics.backend.variant import versions
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.estimators import RADIANCE_CACHE, SPPM
@@ -46,27 +46,6 @@ from optisense.quality import PICTURE_PHOTONS, SCORE_PHOTONS
 SPPM_PASS_PHOTONS = 1_000_000
 """Largest number of photons of one pass of the `sppm` estimator: enough that a disc of 0.3 mm on
 GelSight Mini gets some 300 landings, and a photon map of 60 MB."""
-
-
-@dataclass(frozen=True)
-class RenderProgress:
-    """The progress of a render.
-
-    Attributes:
-        stage: the current stage.
-        part: traced part of the photons, 0 to 1.
-        fraction: approximate completed fraction of the render, 0 to 1.
-        photons: number of photons traced so far.
-        noise: relative noise, per cent; None if it is not known.
-        seconds: time since the start, s.
-    """
-
-    stage: Stage
-    part: float
-    fraction: float
-    photons: int
-    noise: float | None
-    seconds: float
 
 
 @dataclass(frozen=True)
@@ -225,7 +204,7 @@ class OpticalModel(RayModel):
         number = None if photons is None else number_of_photons(photons)
         began = time.perf_counter()
         bound_memory()
-        on_stage = _stage_callback(progress or self.listener, began)
+        on_stage = stage_callback(progress or self.listener, began)
 
         on_stage(Stage.PREPARING, 0.0, 0, None)
         view = self._contact_view(contacts, resolution, skin)
@@ -409,22 +388,6 @@ class OpticalModel(RayModel):
             samples=[result.passes, result.passes],
             interrupted=False,
         )
-
-
-def _stage_callback(
-    listener: Callable[[RenderProgress], None] | None, began: float
-) -> StageCallback:
-    """Return a function that tells a listener of each stage of a render that began at a time, s."""
-
-    def on_stage(stage: Stage, part: float, traced: int, reached: float | None) -> None:
-        if listener is not None:
-            noise = None if reached is None or not np.isfinite(reached) else 100 * reached
-            seconds = time.perf_counter() - began
-            listener(
-                RenderProgress(stage, part, fraction_done(stage, part), traced, noise, seconds)
-            )
-
-    return on_stage
 
 
 def _named(contacts: Sequence[Contact], placed: list[TriangleMesh]) -> dict[str, TriangleMesh]:

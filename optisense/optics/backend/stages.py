@@ -1,8 +1,11 @@
-"""The stages of a render, as progress reports name them."""
+"""The stages of a render, and the reports of its progress that name them."""
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from enum import Enum
 
 
@@ -15,6 +18,27 @@ class Stage(Enum):
     SMOOTHING = "smoothing the light"
     SHADING = "shading the picture"
     DONE = "done"
+
+
+@dataclass(frozen=True)
+class RenderProgress:
+    """The progress of a render.
+
+    Attributes:
+        stage: the current stage.
+        part: traced part of the photons, 0 to 1.
+        fraction: approximate completed fraction of the render, 0 to 1.
+        photons: number of photons traced so far.
+        noise: relative noise, per cent; None if it is not known.
+        seconds: time since the start, s.
+    """
+
+    stage: Stage
+    part: float
+    fraction: float
+    photons: int
+    noise: float | None
+    seconds: float
 
 
 StageCallback = Callable[[Stage, float, int, float | None], None]
@@ -33,7 +57,7 @@ _BEFORE = {
 with five million photons."""
 
 
-def fraction_done(stage: Stage, part: float) -> float:
+def _fraction_done(stage: Stage, part: float) -> float:
     """Estimate the completed fraction (0 to 1) of a render.
 
     Args:
@@ -42,3 +66,19 @@ def fraction_done(stage: Stage, part: float) -> float:
     if stage is not Stage.PHOTONS:
         return _BEFORE[stage]
     return _BEFORE[stage] + part * (_BEFORE[Stage.SMOOTHING] - _BEFORE[stage])
+
+
+def stage_callback(
+    listener: Callable[[RenderProgress], None] | None, began: float
+) -> StageCallback:
+    """Return a function that tells a listener of each stage of a render that began at a time, s."""
+
+    def on_stage(stage: Stage, part: float, traced: int, reached: float | None) -> None:
+        if listener is not None:
+            noise = None if reached is None or not math.isfinite(reached) else 100 * reached
+            seconds = time.perf_counter() - began
+            listener(
+                RenderProgress(stage, part, _fraction_done(stage, part), traced, noise, seconds)
+            )
+
+    return on_stage
