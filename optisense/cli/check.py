@@ -110,7 +110,7 @@ def _describe(design: SensorDesign) -> int:
     from optisense.design.camera_checks import view_shares
     from optisense.design.parts import Role
     from optisense.library import unused_imaging
-    from optisense.mechanics import elasticity_in_words, is_attached, rims_in_words
+    from optisense.mechanics import elasticity_in_words, is_attached, is_hollow, rims_in_words
 
     output.print(design.name, style="bold")
     if design.description:
@@ -156,8 +156,14 @@ def _describe(design: SensorDesign) -> int:
         if loose:
             sentence = "warning: the gel touches no rigid part; its elastic skin can't be pressed"
             output.print(sentence, style="yellow")
-        elif limits := rims_in_words(design):
-            output.print(f"            {limits}")
+        else:
+            if is_hollow(design):
+                output.print(
+                    "            nothing holds the back of the gel under most of its skin "
+                    "(hollow): forces are those of a gel held all over its back, and too large"
+                )
+            if limits := rims_in_words(design):
+                output.print(f"            {limits}")
     assumed = sum(entry.status == "assumed" for entry in design.provenance.values())
     if assumed:
         output.print(f"{assumed} of its values are marked as assumed.", style="yellow")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from optisense.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
-    from optisense.mechanics._contact_checks import is_attached, refuse_loose_gel
+    from optisense.mechanics._contact_checks import is_attached, is_hollow, refuse_loose_gel
     from optisense.mechanics._deformed_mesh import SkinMesh, SkinState, skin_mesh
     from optisense.mechanics._elasticity import Elasticity, youngs_modulus_of_shore_a
     from optisense.mechanics._gel import Gel, elasticity_in_words, elasticity_of
@@ -33,6 +33,7 @@ __all__ = [
     "elasticity_in_words",
     "elasticity_of",
     "is_attached",
+    "is_hollow",
     "refuse_loose_gel",
     "rims_in_words",
     "skin_mesh",

@@ -15,7 +15,7 @@ from optisense.errors import ContactError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.coincidence import boxes_overlap, find_coincident
 from optisense.geometry.overlaps import find_overlap, touching_vertices
-from optisense.geometry.rays import GLUE
+from optisense.geometry.rays import GLUE, exits, ray_hits
 from optisense.mechanics._footprint import Footprint
 
 SHALLOWEST = 1e-3
@@ -25,6 +25,15 @@ facet errors of indenters (4e-4 mm), as smaller depths may be due to them."""
 ALONG_AN_EDGE = (0.1, 0.3, 0.5, 0.7, 0.9)
 """Places along the part of an open edge inside the gel, as shares of its length, at which it is
 tested for whether it touches the skin: the middles of five equal parts."""
+
+
+FILM = 2.0 * GLUE
+"""Length (mm) of a line between the back of a gel and the part that holds it, up to which it counts
+as held: that of the thickest film of glue, if the line is inclined by up to 60 degrees to it."""
+
+BACK_LINES = 30
+"""Number of lines from the skin to the back of the gel, to see whether most of it is held; they
+take less than 0.1 s."""
 
 
 def refuse_shared_skin(one: Footprint, other: Footprint) -> None:
@@ -84,6 +93,34 @@ def _overlap_at(place: Footprint, local: FloatArray) -> FloatArray:
 
 def is_attached(design: SensorDesign) -> bool:
     """Return whether any part of a design other than the skin touches its gel."""
+    gels, others = _gels_and_others(design)
+    return any(_hold_each_other(gel, other) for gel in gels for other in others)
+
+
+def is_hollow(design: SensorDesign) -> bool:
+    """Return whether no rigid part lies at the back of the gel under most of the skin of a design,
+    as in a hollow dome that is held at its rim only.
+    """
+    gels, others = _gels_and_others(design)
+    meshes = design.deformed_meshes()
+    skins = [meshes[name] for name in design.parts_of(Role.SENSING_SURFACE)]
+    if not gels or not skins:
+        return False
+    skin = TriangleMesh.joined(skins)
+    reached = np.cumsum(skin.face_areas)
+    steps = (np.arange(BACK_LINES) + 0.5) / BACK_LINES * reached[-1]
+    faces = np.searchsorted(reached, steps)  # each stands for an equal share of the area
+    starts, ways = skin.triangles[faces].mean(axis=1), skin.face_normals[faces]
+    nearest = np.full(len(faces), np.inf)
+    for other in others:
+        hits = ray_hits(other, starts, ways)
+        np.minimum.at(nearest, hits.ray, hits.distance)
+    free = nearest > exits(gels, starts, ways) + FILM
+    return bool(np.count_nonzero(free) > BACK_LINES / 2)
+
+
+def _gels_and_others(design: SensorDesign) -> tuple[list[TriangleMesh], list[TriangleMesh]]:
+    """Return the gels of a design, and the parts that may hold them, mm."""
     meshes = design.deformed_meshes()
     gels = [meshes[name] for name in design.parts_of(Role.ELASTOMER)]
     others = [
@@ -91,7 +128,7 @@ def is_attached(design: SensorDesign) -> bool:
         for name, part in design.parts.items()
         if part.role not in (Role.ELASTOMER, Role.SENSING_SURFACE, Role.INDENTER)
     ]
-    return any(_hold_each_other(gel, other) for gel in gels for other in others)
+    return gels, others
 
 
 def refuse_loose_gel(design: SensorDesign) -> None:

@@ -6,7 +6,7 @@ from optisense.design import Part
 from optisense.design.parts import Role
 from optisense.errors import ContactError
 from optisense.geometry import Contact, Sphere, TriangleMesh
-from optisense.mechanics import is_attached, refuse_loose_gel
+from optisense.mechanics import is_attached, is_hollow, refuse_loose_gel
 from optisense.optics._ray_model import RayModel
 from optisense.sensors import load
 
@@ -43,6 +43,20 @@ def test_a_plate_holds_a_gel_only_where_it_touches_it():
     assert not is_attached(loose(1.0))
     with pytest.raises(ContactError, match=r"'gel'.* is attached to nothing"):
         refuse_loose_gel(loose(1.0))
+
+
+@pytest.mark.parametrize("name", SENSORS)
+def test_only_the_gel_of_svelte_has_air_behind_it(name):
+    assert is_hollow(load(name)) is (name == "gelsight-svelte")
+
+
+@pytest.mark.parametrize(("width", "free"), [(1.0, False), (0.6, False), (0.4, True)])
+def test_a_gel_is_hollow_where_its_support_leaves_most_of_its_back_free(width, free):
+    design = loose(0.0)
+    plate = design.meshes["plate"]
+    design.meshes["plate"] = plate.with_vertices(plate.vertices * (width, 1.0, 1.0))
+    assert is_attached(design)
+    assert is_hollow(design) is free
 
 
 def test_a_loose_gel_takes_a_conforming_contact_only():
