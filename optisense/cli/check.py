@@ -154,8 +154,11 @@ def _describe(design: SensorDesign) -> int:
         output.print(f"elasticity  {elasticity_in_words(design)}")
         loose = not is_attached(design)
         if loose:
-            sentence = "warning: the gel touches no rigid part; its elastic skin can't be pressed"
-            output.print(sentence, style="yellow")
+            output.print(
+                "warning: the gel touches no rigid part; its elastic skin can't be pressed. Add a "
+                "support on its far side, or take the conforming skin (--skin conforming)",
+                style="yellow",
+            )
         else:
             if is_hollow(design):
                 output.print(

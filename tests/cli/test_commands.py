@@ -151,6 +151,16 @@ def test_a_misspelt_field_is_told_with_file_and_line(tmp_path: Path) -> None:
     assert "fov" in text
 
 
+def test_a_loose_gel_can_be_pressed_with_the_conforming_skin(tmp_path: Path) -> None:
+    design = optisense.load("gelsight-mini-ideal")
+    for name in set(design.parts) - {"gel", "skin"}:
+        del design.parts[name], design.meshes[name]
+    optisense.save_design(design, tmp_path / "loose")
+    code, text = run("check", str(tmp_path / "loose"))
+    assert code == 0, text
+    assert "the gel touches no rigid part" in text and "--skin conforming" in text
+
+
 @pytest.mark.parametrize(
     ("contact", "complaint"),
     [
