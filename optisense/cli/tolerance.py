@@ -97,7 +97,7 @@ def tolerance(
     if as_json:
         print_json(found.to_dict())
     else:
-        _print(found)
+        print_tolerance(found, usual=errors is None)
         if out is not None:
             for name in [JSON_FILE, VALUES_FILE, *([REPORT_FILE] if report else [])]:
                 output.print(f"written: {out / name}")
@@ -140,8 +140,10 @@ def _write(found: Tolerance, folder: Path, report: bool) -> None:
         remove_own_page(folder / REPORT_FILE, "tolerance")
 
 
-def _print(found: Tolerance) -> None:
-    """Print one table of percentiles, and one of shares for each objective."""
+def print_tolerance(found: Tolerance, usual: bool) -> None:
+    """Print one table of percentiles, and one of shares for each objective; `usual` if the errors
+    are the usual ones.
+    """
     table = table_of("objective", "nominal", "P10", "P50", "P90", "spread", "noise")
     for name, each in found.results.items():
         table.add_row(
@@ -160,6 +162,11 @@ def _print(found: Tolerance) -> None:
             output.print(f"{name}: {each.caveat}")
     for reason, count in sorted(found.failures.items(), key=lambda item: -item[1]):
         output.print(f"{count} of {found.sensors} sensors fail: {reason}")
+    if usual:
+        output.print(
+            "the camera and the positions of parts were taken as exact; to include them, give all "
+            "errors, such as --error camera.position.z=0.1 --error lights.position=0.1"
+        )
 
 
 def _print_shares(name: str, found: ScoreDistribution) -> None:

@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 
 import optisense as ots
 from optisense.cli import app
+from optisense.cli.tolerance import print_tolerance
 from optisense.design import SensorDesign, set_value
 from optisense.report.tolerance import P10_INTERVAL, render_tolerance, shown_size, spread_figure
 from optisense.search import ToleranceDistribution
@@ -107,6 +108,14 @@ def test_the_command(tmp_path: Path) -> None:
     assert order == sorted(order)
     assert set(result["shares"]) == {"camera.fov", "camera.position.z"}
     assert (out / "tolerance.html").read_text(encoding="utf-8").rstrip().endswith("</html>")
+
+
+@pytest.mark.parametrize("usual", [True, False])
+def test_an_exact_camera_is_told(
+    found: Tolerance, usual: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    print_tolerance(found, usual)
+    assert ("--error camera.position.z=0.1" in capsys.readouterr().out) is usual
 
 
 @pytest.mark.parametrize(
