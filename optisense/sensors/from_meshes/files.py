@@ -4,6 +4,7 @@ their units.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -132,7 +133,8 @@ class CadFiles:
         hint = f"Correct the path; it starts from the folder {self._folder}"
         if near is not None:
             hint = f"Did you mean '{Path(file).with_name(near).as_posix()}'?"
-        raise MeshError(f"there is no file '{brief(file)}'", where=str(path), hint=hint)
+        looked_for = os.path.normpath(Path(os.path.realpath(self._folder)) / file)
+        raise MeshError(f"there is no file '{brief(file)}'", where=looked_for, hint=hint)
 
 
 def _mesh(path: Path) -> TriangleMesh:

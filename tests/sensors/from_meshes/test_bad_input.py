@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -86,6 +87,19 @@ class TestFiles:
         assert "there is no file 'gell.stl'" in error.message
         assert error.hint == "Did you mean 'gel.stl'?"
         assert error.where == f"part gel ({cad.folder / 'gell.stl'})"
+
+    def test_a_recipe_that_was_copied_tells_where_it_looked(
+        self, cad: Any, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        file = cad.write(cad.recipe.replace("gel.stl", "../cad/gel.stl"))
+        copy = cad.folder.parent / "far" / "away" / "sensor.yaml"
+        copy.parent.mkdir(parents=True)
+        file.rename(copy)
+        monkeypatch.chdir(copy.parent)
+        error = error_of(Path("sensor.yaml"))
+        assert "there is no file '../cad/gel.stl'" in error.message
+        looked = os.path.realpath(copy.parent.parent / "cad" / "gel.stl")
+        assert error.where == f"part gel ({looked})"
 
     def test_a_missing_file_in_a_subfolder(self, cad: Any) -> None:
         file = cad.write(cad.recipe.replace("gel.stl", "cad/gell.stl"))
