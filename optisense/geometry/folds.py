@@ -29,6 +29,7 @@ LONGEST_EDGES = 64
 as the square of the length."""
 
 _longest: weakref.WeakKeyDictionary[TriangleMesh, NDArray[np.int32]] = weakref.WeakKeyDictionary()
+_entangled: weakref.WeakKeyDictionary[TriangleMesh, bool] = weakref.WeakKeyDictionary()
 _outlines: weakref.WeakKeyDictionary[TriangleMesh, NDArray[np.int64]] = weakref.WeakKeyDictionary()
 
 
@@ -91,11 +92,20 @@ def find_fold(
             return None
     crossed = self_crossings(bent.welded())
     # A part at rest may consist of shells that cut through each other.
-    if len(crossed.pairs) and len(self_crossings(mesh.welded(), limit=1).pairs) == 0:
+    if len(crossed.pairs) and not _is_entangled(mesh):
         place = crossed.places[0]
         vertex = int(np.argmin(np.linalg.norm(bent.vertices - place, axis=1)))
         return Fold("through itself", place, vertex, len(crossed.pairs))
     return None
+
+
+def _is_entangled(mesh: TriangleMesh) -> bool:
+    """Return whether a mesh at rest cuts through itself; cached for the next call."""
+    entangled = _entangled.get(mesh)
+    if entangled is None:
+        found = self_crossings(mesh.welded(), limit=1)
+        entangled = _entangled[mesh] = len(found.pairs) > 0
+    return entangled
 
 
 def is_in_full_view(mesh: TriangleMesh, bent: TriangleMesh) -> bool:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from optisense.geometry import TriangleMesh, cage_points
+from optisense.geometry import TriangleMesh, cage_points, folds
 from optisense.geometry.cage import deformed
+from optisense.geometry.crossings import Crossings, self_crossings
 from optisense.geometry.folds import Fold, find_fold, is_in_full_view
 from optisense.geometry.overlaps import find_overlap, near_surface, touching_vertices
 
@@ -69,8 +70,8 @@ def test_a_mirrored_sheet_looks_to_the_wrong_side_and_a_turned_one_does_not() ->
     assert fold_of(sheet(0.5), points * [1.0, 1.0, -1.0]) is None  # bowed the other way
 
 
-def test_a_sheet_rolled_through_itself_is_found() -> None:
-    """A loop like a ribbon's: each vertex is fine, the whole is not.
+def fold_of_a_loop(mesh: TriangleMesh) -> Fold | None:
+    """Bend a mesh into a loop like a ribbon's: each vertex is fine, the whole is not.
 
     With four points along x the middle line is a cubic curve, which can cross itself; of three
     points it would be a parabola, which can't.
@@ -79,11 +80,33 @@ def test_a_sheet_rolled_through_itself_is_found() -> None:
     points = cage_points(BOX, lattice).reshape(4, 3, 3, 3)
     points[1, :, :, 0], points[2, :, :, 0] = 15.0, -15.0
     points[1:3, :, :, 2] += 20.0
-    flat, mesh = points.reshape(-1, 3), sheet()
-    bent = deformed(mesh, BOX, lattice, flat)
-    fold = find_fold(mesh, bent, BOX, lattice, flat)
+    flat = points.reshape(-1, 3)
+    return find_fold(mesh, deformed(mesh, BOX, lattice, flat), BOX, lattice, flat)
+
+
+def test_a_sheet_rolled_through_itself_is_found() -> None:
+    fold = fold_of_a_loop(sheet())
     assert fold is not None and fold.kind == "through itself"
     assert abs(fold.place[0]) < 0.5  # the loop closes in its plane of symmetry
+
+
+def test_a_mesh_that_cuts_through_itself_at_rest_is_searched_once_there(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    flat = sheet().vertices
+    tilted = sheet().with_vertices(0.9 * flat + 0.2 * flat[:, [2, 2, 1]] + [0.0, 0.0, 0.03])
+    searched: list[int | None] = []
+
+    def counted(mesh: TriangleMesh, limit: int | None = None) -> Crossings:
+        searched.append(limit)
+        return self_crossings(mesh, limit)
+
+    monkeypatch.setattr(folds, "self_crossings", counted)
+    entangled, sound = TriangleMesh.joined([sheet(), tilted]), sheet()
+    for _ in range(2):
+        assert fold_of_a_loop(entangled) is None
+        assert fold_of_a_loop(sound) is not None
+    assert searched.count(1) == 2
 
 
 def test_full_view() -> None:
