@@ -7,6 +7,9 @@ cut through each other, and bodies that overlap; these must be corrected in the 
 
 from __future__ import annotations
 
+from functools import cache
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -361,7 +364,12 @@ def _within(bodies: list[TriangleMesh], where: str | None) -> BoolArray:
     part for messages, two that overlap in part, or have a part of their surfaces in common, so that
     one is no cavity of the other, raise MeshError.
     """
-    solids = [as_manifold(body if body.volume > 0.0 else body.flipped()) for body in bodies]
+
+    @cache
+    def solid(number: int) -> Any:
+        body = bodies[number]
+        return as_manifold(body if body.volume > 0.0 else body.flipped())
+
     result = np.zeros((len(bodies), len(bodies)), dtype=bool)
     for one, body in enumerate(bodies):
         for two in range(one):
@@ -372,11 +380,11 @@ def _within(bodies: list[TriangleMesh], where: str | None) -> BoolArray:
                 result[one, two] = inside(body.vertices[0], other)[0]
                 result[two, one] = inside(other.vertices[0], body)[0]
                 continue
-            place = thick_place(solids[one] ^ solids[two], TOUCH)
+            place = thick_place(solid(one) ^ solid(two), TOUCH)
             if place is None:
                 continue
-            result[one, two] = thick_place(solids[one] - solids[two], TOUCH) is None
-            result[two, one] = thick_place(solids[two] - solids[one], TOUCH) is None
+            result[one, two] = thick_place(solid(one) - solid(two), TOUCH) is None
+            result[two, one] = thick_place(solid(two) - solid(one), TOUCH) is None
             if where is None:
                 continue
             shared = len(find_coincident(body, other, TOUCH, facing=False).pairs) > 0
