@@ -41,7 +41,8 @@ SMALL = (100, 75)
 """Size (pixels) of photographs that show the contacts well enough for a fit."""
 
 SMALLER = (64, 48)
-"""Size (pixels) of photographs that show well enough which light is dim or lies lower."""
+"""Size (pixels) of photographs that show well enough which light is dim or lies lower, and that
+determine all numbers of the camera."""
 
 
 @pytest.fixture(scope="session")
@@ -63,18 +64,25 @@ def small_photographs(mini: OpticalModel) -> Photographs:
 
 
 @pytest.fixture(scope="session")
-def seen(photographs: Photographs) -> list[SeenContact]:
-    found = [place for place in ContactFinder(photographs).contacts() if place is not None]
-    assert len(found) == len(photographs.presses)
+def smaller_photographs(mini: OpticalModel) -> Photographs:
+    """The same presses in photographs of the least size, for fits without renderings."""
+    return photograph_model(mini, BALLS, resolution=SMALLER, photons=PHOTONS, seed=5)
+
+
+@pytest.fixture(scope="session")
+def seen(smaller_photographs: Photographs) -> list[SeenContact]:
+    """The contacts in the smaller photographs."""
+    found = [place for place in ContactFinder(smaller_photographs).contacts() if place is not None]
+    assert len(found) == len(smaller_photographs.presses)
     return found
 
 
 @pytest.fixture(scope="session")
 def layers(
-    mini: OpticalModel, photographs: Photographs, seen: list[SeenContact]
+    mini: OpticalModel, smaller_photographs: Photographs, seen: list[SeenContact]
 ) -> LayeredPictures:
-    """The layers of the photographs; tests don't change them."""
-    return layered_pictures(mini, photographs, seen, PHOTONS, 5)
+    """The layers of the smaller photographs; tests don't change them."""
+    return layered_pictures(mini, smaller_photographs, seen, PHOTONS, 5)
 
 
 def with_pictures(photographs: Photographs, pictures: Sequence[np.ndarray]) -> Photographs:

@@ -72,22 +72,22 @@ def hidden_steps(chosen: list) -> np.ndarray:  # type: ignore[type-arg]
 
 
 def test_hidden_numbers_are_found_within_their_uncertainties(
-    photographs: Photographs, seen: list[SeenContact], layers: LayeredPictures
+    smaller_photographs: Photographs, seen: list[SeenContact], layers: LayeredPictures
 ) -> None:
     chosen = quantities_of(ots.load("gelsight-mini-ideal"), CHEAP)
     exposure = 250.0
     still = np.zeros((len(seen), 3))
     start = np.zeros(len(chosen))
     truth = hidden_steps(chosen)
-    made = LayeredFit(photographs, seen, layers, chosen, exposure, start, {})
-    moved = np.tile([0.6, -0.4, 0.05], (len(seen), 1))
+    made = LayeredFit(smaller_photographs, seen, layers, chosen, exposure, start, {})
+    moved = np.tile([0.25, -0.15, 0.05], (len(seen), 1))
     rng = np.random.default_rng(1)
     pictures = []
     for levels in made.pictures(truth, moved):
         noisy = levels + 2.0 * rng.standard_normal(levels.shape)
         noisy[30:33, 20:24] = 230.0  # dust
         pictures.append(noisy)
-    real = with_pictures(photographs, pictures)
+    real = with_pictures(smaller_photographs, pictures)
     fit = LayeredFit(real, seen, layers, chosen, exposure, start, {})
     found = fit.solve(start, still)
     deviations = np.sqrt(np.diag(found.covariance))
@@ -98,15 +98,15 @@ def test_hidden_numbers_are_found_within_their_uncertainties(
 
 
 def test_a_number_leaves_its_limit_where_the_photographs_ask_for_it(
-    photographs: Photographs, seen: list[SeenContact], layers: LayeredPictures
+    smaller_photographs: Photographs, seen: list[SeenContact], layers: LayeredPictures
 ) -> None:
     """Beyond a limit a number has no derivative, so that a fit would stay there."""
     chosen = quantities_of(ots.load("gelsight-mini-ideal"), ["shading"])
     still, start = np.zeros((len(seen), 3)), np.zeros(len(chosen))
     truth, stuck = start.copy(), start.copy()
     truth[0], stuck[0] = (0.6 - 0.2) / chosen[0].plausible_range, chosen[0].limits()[1]
-    made = LayeredFit(photographs, seen, layers, chosen, 250.0, start, {})
-    real = with_pictures(photographs, made.pictures(truth, still))
+    made = LayeredFit(smaller_photographs, seen, layers, chosen, 250.0, start, {})
+    real = with_pictures(smaller_photographs, made.pictures(truth, still))
     fit = LayeredFit(real, seen, layers, chosen, 250.0, start, {})
     found = fit.solve(stuck, still)
     assert chosen[0].value(float(found.steps[0])) == pytest.approx(0.6, abs=0.02)
@@ -114,22 +114,25 @@ def test_a_number_leaves_its_limit_where_the_photographs_ask_for_it(
 
 
 def test_what_a_change_of_contact_does_is_known_without_rendering(
-    mini: OpticalModel, photographs: Photographs, seen: list[SeenContact], layers: LayeredPictures
+    mini: OpticalModel,
+    smaller_photographs: Photographs,
+    seen: list[SeenContact],
+    layers: LayeredPictures,
 ) -> None:
-    fit = LayeredFit(photographs, seen, layers, [], 250.0, np.zeros(0), {})
+    fit = LayeredFit(smaller_photographs, seen, layers, [], 250.0, np.zeros(0), {})
     moved = [
-        SeenContact((place.centre[0] + 1.0, place.centre[1] - 0.5), place.radius * 1.08)
+        SeenContact((place.centre[0] + 0.4, place.centre[1] - 0.2), place.radius * 1.08)
         for place in seen
     ]
-    other = layered_pictures(mini, photographs, moved, PHOTONS, 5)
-    again = LayeredFit(photographs, moved, other, [], 250.0, np.zeros(0), {})
+    other = layered_pictures(mini, smaller_photographs, moved, PHOTONS, 5)
+    again = LayeredFit(smaller_photographs, moved, other, [], 250.0, np.zeros(0), {})
     none = np.zeros(0)
-    amount = np.tile([1.0, -0.5, np.log(1.08)], (len(seen), 1))
+    amount = np.tile([0.4, -0.2, np.log(1.08)], (len(seen), 1))
     rough = fit.pictures(none, amount)
     still = fit.pictures(none, 0.0 * amount)
     exact = again.pictures(none, 0.0 * amount)
     for index, place in enumerate(seen, start=1):
-        near = distances(photographs.background.shape, place) <= 1.6
+        near = distances(smaller_photographs.background.shape, place) <= 1.6
         change, told = (exact[index] - still[index])[near], (rough[index] - still[index])[near]
         cosine = (change * told).sum() / np.sqrt((change**2).sum() * (told**2).sum())
         length = np.sqrt((told**2).sum() / (change**2).sum())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -12,17 +13,39 @@ import optisense as ots
 from optisense.calibration import Photographs
 from optisense.calibration._gauss_newton import LayeredFit
 from optisense.calibration._least_squares import jackknife_covariance
-from optisense.calibration.model_pictures import LayeredPictures, PictureSlopes, averaged
+from optisense.calibration.model_pictures import (
+    LayeredPictures,
+    PictureSlopes,
+    averaged,
+    layered_pictures,
+)
 from optisense.calibration.quantities import quantities_of
-from optisense.calibration.seen_contacts import SeenContact
+from optisense.calibration.seen_contacts import ContactFinder, SeenContact
 
-from .conftest import with_pictures
+from .conftest import PHOTONS, with_pictures
+
+if TYPE_CHECKING:
+    from optisense.optics import OpticalModel
 
 CLUSTERS, ROWS, UNKNOWNS = 12, 200, 5
 """Size of a linear fit: as many clusters as there are blocks in a picture of 4 to 3."""
 
 LIGHT_NOISE = 0.02
 """Standard deviation of the noise of the light, as a share of it: that of some million photons."""
+
+
+@pytest.fixture(scope="module")
+def seen(photographs: Photographs) -> list[SeenContact]:
+    """The contacts in photographs whose noise of the light has its usual extent in pixels."""
+    return [place for place in ContactFinder(photographs).contacts() if place is not None]
+
+
+@pytest.fixture(scope="module")
+def layers(
+    mini: OpticalModel, photographs: Photographs, seen: list[SeenContact]
+) -> LayeredPictures:
+    """The layers of these photographs; tests don't change them."""
+    return layered_pictures(mini, photographs, seen, PHOTONS, 5)
 
 
 def test_the_jackknife_states_the_scatter_of_fits_with_correlated_errors() -> None:
