@@ -58,14 +58,16 @@ def test_missing_and_damaged_samples_are_made_again(
 ) -> None:
     folder = tmp_path / "copy"
     shutil.copytree(made.folder, folder)
-    (folder / made.labels[0]["file_name"]).unlink()
-    assert_same(made, generate(mini, folder, COUNT, SETTINGS))
+    missing = folder / made.labels[0]["file_name"]
+    missing.unlink()
     arrays = folder / made.labels[1]["arrays"]
     arrays.write_bytes(arrays.read_bytes()[:100])
     damaged = generate(mini, folder, COUNT, SETTINGS)  # which reads no sample
+    made_again = missing.stat().st_mtime_ns
     with pytest.raises(TaskError, match="sample 1"):
         damaged[1]
     assert_same(made, generate(mini, folder, COUNT, SETTINGS, mend=True))
+    assert missing.stat().st_mtime_ns == made_again  # before, without `mend`
 
 
 def test_labels_are_true(made: Dataset, mini: OpticalModel) -> None:
@@ -161,30 +163,24 @@ def test_noise_of_the_camera_is_all_that_it_changes(
 def test_an_interrupted_dataset_continues_to_the_same(
     made: Dataset, mini: OpticalModel, tmp_path: Path
 ) -> None:
+    """And a smaller one is the beginning of a larger one."""
+
     def press(done: int, count: int) -> None:
         if done == 2:
             raise KeyboardInterrupt
 
+    folder = tmp_path / "a"
+    assert generate(mini, folder, 1, SETTINGS).labels == made.labels[:1]
     with pytest.raises(KeyboardInterrupt):
-        generate(mini, tmp_path / "a", COUNT, SETTINGS, press)
-    assert len(Dataset.load(tmp_path / "a")) == 2
+        generate(mini, folder, COUNT, SETTINGS, press)
+    assert len(Dataset.load(folder)) == 2
     # As if killed while the next sample was being written.
-    (tmp_path / "a" / "images" / "000002.png").write_bytes(b"half a pict")
-    with (tmp_path / "a" / "metadata.csv").open("a") as file:
+    (folder / "images" / "000002.png").write_bytes(b"half a pict")
+    with (folder / "metadata.csv").open("a") as file:
         file.write("images/000002.png,2,sphe")
     # Another model, as a new process would have.
-    assert_same(
-        generate(OpticalModel(load("gelsight-mini-ideal")), tmp_path / "a", COUNT, SETTINGS), made
-    )
-
-
-def test_a_smaller_dataset_is_the_beginning_of_a_larger_one(
-    made: Dataset, mini: OpticalModel, tmp_path: Path
-) -> None:
-    small = generate(mini, tmp_path / "b", 1, SETTINGS)
-    assert small.labels == made.labels[:1]
-    shutil.copytree(small.folder, tmp_path / "c")
-    assert_same(generate(mini, tmp_path / "c", COUNT, SETTINGS), made)
+    other = OpticalModel(load("gelsight-mini-ideal"))
+    assert_same(generate(other, folder, COUNT, SETTINGS), made)
 
 
 def test_other_settings_and_other_designs_are_refused(made: Dataset, mini: OpticalModel) -> None:
@@ -271,9 +267,10 @@ def test_a_dataset_of_a_sensor_with_an_own_lamp_opens_and_continues_elsewhere(
     settings = replace(SETTINGS, radiance=False, skin="conforming")
     folder = tmp_path / "data"
     model = OpticalModel(design)
-    generate(model, folder, 1, settings)
-    assert len(generate(model, folder, 2, settings)) == 2
-    # Another machine has the folder, and not the lamp.
+    sensor = LambertianSensor(model, model.chief_rays)
+    generate(sensor, folder, 1, settings)
+    assert len(generate(sensor, folder, 2, settings)) == 2
+    # Another machine has the folder, and not the lamp, and renders it.
     monkeypatch.setenv("OPTISENSE_LIBRARY", str(tmp_path / "elsewhere"))
     assert len(generate(OpticalModel(load(folder / "design")), folder, 3, settings)) == 3
 
