@@ -85,7 +85,7 @@ def test_an_interrupted_verification_continues_where_it_was(
     lambertian: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Balls and objects that were read are not pressed again, and the result is the same."""
-    objects, reading = FEW[:2], replace(READING, presses=3)
+    objects, reading = FEW[:2], replace(READING, presses=3, method="table")
     settings = VerificationSettings(objects, places=1, readers=1, reading=reading)
     pair = (lambertian, lambertian)
     pressed = []
