@@ -26,6 +26,7 @@ from optisense.tasks import (
 )
 from optisense.tasks._misalignment import plane_contact
 from optisense.tasks._perception import collect
+from optisense.tasks._snr import signal_to_noise
 
 QUIET = SampleSettings(count=40, camera_noise=0.0, skin="conforming")
 """Settings for colours from algebra, which does not depend on how the gel deforms; the conforming
@@ -232,9 +233,7 @@ def test_the_mean_motion_of_dots_in_pictures_tells_the_shear(
 
 
 @pytest.mark.slow
-def test_a_real_sensor_tells_angles_and_radii(mini: OpticalModel) -> None:
+def test_a_real_sensor_tells_angles(mini: OpticalModel) -> None:
     settings = SampleSettings(count=16, resolution=(32, 24), photons=60_000, skin="conforming")
-    assert perceive(Misalignment(), mini, settings).snr > 2
-    settings = replace(settings, resolution=(64, 48))
-    result = perceive(CylinderRadius(), mini, settings)
-    assert result.reading.error < 0.7 * result.reading.guess
+    samples = collect(Misalignment(), mini, settings)
+    assert signal_to_noise(samples.features, samples.targets) > 2
