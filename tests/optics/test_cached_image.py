@@ -99,12 +99,16 @@ def test_pixels_of_a_metal_contact_are_hardly_noisier_than_its_photons() -> None
     assert np.sqrt((off**2).mean()) < 0.04 * one.radiance[mask].mean()
 
 
-def test_the_outline_of_the_skin_is_smooth() -> None:
+@pytest.fixture(scope="module")
+def svelte() -> OpticalModel:
+    return OpticalModel(build("gelsight-svelte"))
+
+
+def test_the_outline_of_the_skin_is_smooth(svelte: OpticalModel) -> None:
     """Pixels at the edge of GelSight Svelte's mirror are as bright as the share of skin in them."""
     width, height, fine = 80, 60, 8
-    model = OpticalModel(build("gelsight-svelte"))
-    light = model.render([], (width, height), 60_000).radiance.sum(axis=-1)
-    hits = model.chief_rays((width * fine, height * fine)).hit
+    light = svelte.render([], (width, height), 60_000).radiance.sum(axis=-1)
+    hits = svelte.chief_rays((width * fine, height * fine)).hit
     share = hits.reshape(height, fine, width, fine).mean(axis=(1, 3))
     inside = share == 1.0
     edge = ~inside & (share > 0.0)
@@ -113,3 +117,8 @@ def test_the_outline_of_the_skin_is_smooth() -> None:
     assert edge.sum() > 100
     # If each pixel showed what its middle sees, the error would be 0.3.
     assert np.sqrt(np.mean((shown - share[edge]) ** 2)) < 0.2
+
+
+def test_a_picture_may_consist_of_outlines(svelte: OpticalModel) -> None:
+    light = svelte.render([], (3, 2), 60_000).radiance.sum(axis=-1)
+    assert (light[svelte.chief_rays((3, 2)).hit] > 0).all()

@@ -290,8 +290,9 @@ class _Shading:
         filled = between_rays(rays, far) if sparse else np.zeros_like(far)
         first = far & ~filled
         edge = np.zeros_like(far) if self.plan.draft else first & outline(rays.hit)
-        pixel = dr.compress(mi.Bool(padded((first & ~edge).ravel())))
-        self.sample(pixel, dr.zeros(mi.UInt32, dr.width(pixel)), False)
+        if (once := first & ~edge).any():
+            pixel = dr.compress(mi.Bool(padded(once.ravel())))
+            self.sample(pixel, dr.zeros(mi.UInt32, dr.width(pixel)), False)
         if edge.any():
             pixel, number = repeated(edge, OUTLINE_SAMPLES)
             count = dr.opaque(mi.UInt32, OUTLINE_SAMPLES, dr.width(pixel))
