@@ -187,6 +187,7 @@ def rays_that_hit(points: np.ndarray, region: np.ndarray | Region = Region.SENSI
         region=np.broadcast_to(region, shape).astype(np.uint8),
         mirrors=np.zeros(shape, np.uint32),
         reflections=np.zeros(shape, np.uint32),
+        lamp=np.zeros(shape, np.uint32),
     )
 
 

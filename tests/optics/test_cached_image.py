@@ -11,6 +11,9 @@ from optisense.optics.imaging import cached
 from optisense.optics.imaging.sampling import grainy
 from optisense.sensors import build
 
+FINE = 8
+"""Number of rays across a pixel by which shares of pixels are known."""
+
 
 def test_noise_is_grainy_and_slopes_edges_of_the_mask_and_darkness_are_not() -> None:
     random = np.random.default_rng(0)
@@ -99,6 +102,21 @@ def test_pixels_of_a_metal_contact_are_hardly_noisier_than_its_photons() -> None
     assert np.sqrt((off**2).mean()) < 0.04 * one.radiance[mask].mean()
 
 
+def outline_error(light: np.ndarray, seen: np.ndarray) -> float:
+    """Return the RMS deviation of the light (h, w) of the pixels at the outline of an area,
+    relative to that of the nearest pixel inside, from the share of the area in them; ``seen`` is
+    the mask (FINE h, FINE w) of the area.
+    """
+    height, width = light.shape
+    share = seen.reshape(height, FINE, width, FINE).mean(axis=(1, 3))
+    inside = share == 1.0
+    edge = ~inside & (share > 0.0)
+    assert edge.sum() > 100
+    nearest = ndimage.distance_transform_edt(~inside, return_distances=False, return_indices=True)
+    shown = light[edge] / light[*nearest[:, edge]]
+    return float(np.sqrt(np.mean((shown - share[edge]) ** 2)))
+
+
 @pytest.fixture(scope="module")
 def svelte() -> OpticalModel:
     return OpticalModel(build("gelsight-svelte"))
@@ -106,17 +124,20 @@ def svelte() -> OpticalModel:
 
 def test_the_outline_of_the_skin_is_smooth(svelte: OpticalModel) -> None:
     """Pixels at the edge of GelSight Svelte's mirror are as bright as the share of skin in them."""
-    width, height, fine = 80, 60, 8
-    light = svelte.render([], (width, height), 60_000).radiance.sum(axis=-1)
-    hits = svelte.chief_rays((width * fine, height * fine)).hit
-    share = hits.reshape(height, fine, width, fine).mean(axis=(1, 3))
-    inside = share == 1.0
-    edge = ~inside & (share > 0.0)
-    nearest = ndimage.distance_transform_edt(~inside, return_distances=False, return_indices=True)
-    shown = light[edge] / light[*nearest[:, edge]]
-    assert edge.sum() > 100
+    light = svelte.render([], (80, 60), 60_000).radiance.sum(axis=-1)
     # If each pixel showed what its middle sees, the error would be 0.3.
-    assert np.sqrt(np.mean((shown - share[edge]) ** 2)) < 0.2
+    assert outline_error(light, svelte.chief_rays((80 * FINE, 60 * FINE)).hit) < 0.2
+
+
+def test_the_outlines_of_lamps_in_view_are_smooth() -> None:
+    """A camera beside the glass of GelSight Mini sees LEDs through it."""
+    design = build("gelsight-mini-ideal")
+    design.camera.position, design.camera.direction = (0.0, -6.0, -9.0), (0.0, 1.0, 0.35)
+    design.camera.up = (0.0, 0.0, 1.0)
+    model = OpticalModel(design)
+    light = model.render([], (80, 60), 60_000).radiance.sum(axis=-1)
+    # If each pixel showed what its middle sees, the error would be 0.26.
+    assert outline_error(light, model.chief_rays((80 * FINE, 60 * FINE)).lamp > 0) < 0.15
 
 
 def test_a_picture_may_consist_of_outlines(svelte: OpticalModel) -> None:

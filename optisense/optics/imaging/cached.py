@@ -24,7 +24,7 @@ from optisense.optics.imaging.sampling import (
     PixelRegions,
     SamplingPlan,
     grainy,
-    outline,
+    sharp_edges,
 )
 from optisense.optics.radiance_cache.beams import cull_beams
 from optisense.optics.radiance_cache.cache import RadianceCache
@@ -280,7 +280,8 @@ class _Shading:
         interreflection, and those of its reflections.
 
         If there are many beams to sum, only every second pixel is shaded where its neighbours are
-        similar. Pixels in grainy places and at the outline of the skin get further samples.
+        similar. Pixels in grainy places and at the outlines of the skin and of lamps get further
+        samples.
         """
         far = ~self.regions.near
         rays = self.regions.rays
@@ -289,7 +290,7 @@ class _Shading:
         sparse = self._sparse = int(far.sum()) * beams > most
         filled = between_rays(rays, far) if sparse else np.zeros_like(far)
         first = far & ~filled
-        edge = np.zeros_like(far) if self.plan.draft else first & outline(rays.hit)
+        edge = np.zeros_like(far) if self.plan.draft else first & sharp_edges(rays)
         if (once := first & ~edge).any():
             pixel = dr.compress(mi.Bool(padded(once.ravel())))
             self.sample(pixel, dr.zeros(mi.UInt32, dr.width(pixel)), False)

@@ -48,9 +48,9 @@ GRAIN_SAMPLES = 4
 halves the grain; they are limited to half of the image's samples. Without them, the error outside
 the contact of GelSight Svelte is 21 % larger (benchmarks/ablation.md)."""
 OUTLINE_SAMPLES = 9
-"""Number of camera samples per pixel at the outline of the skin, such as the edge of a
-mirror, so that it is smooth, as in photographs. On GelSight Svelte, 1,200 of 76,800 pixels lie
-there."""
+"""Number of camera samples per pixel at the outlines of the skin, such as the edge of a mirror, and
+of lamps in view, so that they are smooth, as in photographs. On GelSight Svelte, 1,200 of 76,800
+pixels lie there."""
 GRAIN_THRESHOLD = 0.03
 """Threshold of the relative RMS deviation of pixels from the mean of their neighbours above which a
 place is grainy: three times a camera's own noise, which is about 0.01."""
@@ -181,6 +181,21 @@ def grainy(image: NDArray[np.float32], where: NDArray[np.bool_]) -> NDArray[np.b
     return where & (square > GRAIN_THRESHOLD**2 * np.maximum(share, 1e-6))
 
 
-def outline(hit: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return a mask (h, w) of the pixels on both sides of the outline of a mask ``hit`` (h, w)."""
-    return np.asarray(ndimage.binary_dilation(hit) & ndimage.binary_dilation(~hit))
+def outline(label: NDArray[np.generic]) -> NDArray[np.bool_]:
+    """Return a mask (h, w) of the pixels whose label (h, w) differs from that of a pixel beside
+    them: those on both sides of the outline of each area of one label.
+    """
+    found = np.zeros(label.shape, dtype=bool)
+    for one, other in (np.s_[1:, :], np.s_[:-1, :]), (np.s_[:, 1:], np.s_[:, :-1]):
+        apart = label[one] != label[other]
+        found[one] |= apart
+        found[other] |= apart
+    return found
+
+
+def sharp_edges(rays: ChiefRays) -> NDArray[np.bool_]:
+    """Return a mask (h, w) of the pixels at the outlines of the skin and of lamps in view.
+
+    Lamps that are narrower than a pixel are missed where no middle of a pixel sees them.
+    """
+    return outline(np.where(rays.hit, -1, rays.lamp.astype(np.int64)))

@@ -16,6 +16,7 @@ from optisense.optics.backend.arrays import floats
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.scene.assembly import SMOOTH_METAL
 from optisense.optics.scene.ray_scene import Ray, RayScene
+from optisense.optics.scene.surface_table import surface_light
 from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind
 from optisense.optics.transport.interact import RayKind, interact
 
@@ -40,8 +41,8 @@ class RayOutcome(IntEnum):
 
 @dataclass(frozen=True)
 class ChiefRays:
-    """The chief rays of a picture, one per pixel; entries other than ``outcome`` are valid where it
-    is HIT.
+    """The chief rays of a picture, one per pixel; entries other than ``outcome`` and ``lamp`` are
+    valid where ``outcome`` is HIT.
 
     Attributes:
         points: (h, w, 3) end points, mm.
@@ -56,6 +57,7 @@ class ChiefRays:
         reflections: (h, w) code of the surfaces that have reflected the ray, in order, be it a
             mirror or by total reflection; 0 for a ray that nothing has reflected. Where neighbours
             have different codes, the surface appears folded between them.
+        lamp: (h, w) number + 1 of the light whose emitting face the ray ends on, else 0.
     """
 
     points: NDArray[np.float32]
@@ -67,6 +69,7 @@ class ChiefRays:
     region: NDArray[np.uint8]
     mirrors: NDArray[np.uint32]
     reflections: NDArray[np.uint32]
+    lamp: NDArray[np.uint32]
 
     @property
     def hit(self) -> NDArray[np.bool_]:
@@ -89,6 +92,7 @@ def _trace(scene: RayScene, patches: mi.UInt32 | None, ray: Ray) -> tuple[Any, .
     face = mi.UInt32(0)
     mirrors = mi.UInt32(0)
     reflections = mi.UInt32(0)
+    lamp = mi.UInt32(0)
     path = mi.UInt32(0)
     while dr.hint(ray.active, exclude=[scene, patches]):
         step = interact(scene, ray, RayKind.CHIEF)
@@ -104,6 +108,8 @@ def _trace(scene: RayScene, patches: mi.UInt32 | None, ray: Ray) -> tuple[Any, .
             patch = dr.gather(mi.UInt32, patches, hit.face, hit.valid)
             code = patch * 2 + dr.select(step.totally, mi.UInt32(1), mi.UInt32(0))
             path = dr.select(hit.valid, (path ^ code) * HASH_FACTOR + 1, path)
+        lit = step.light & (step.side > 0)
+        lamp = dr.select(lit, surface_light(scene.table, hit.surface, lit) + 1, lamp)
         total |= step.totally
         mirrors |= dr.select(step.scattered, mi.UInt32(1) << (hit.surface % MIRROR_BITS), 0)
         reflections = dr.select(
@@ -112,7 +118,7 @@ def _trace(scene: RayScene, patches: mi.UInt32 | None, ray: Ray) -> tuple[Any, .
         ray = step.ray
     failed = total & (outcome != int(RayOutcome.HIT))
     outcome = dr.select(failed, int(RayOutcome.TOTAL_REFLECTION), outcome)
-    return outcome, point, normal, ray.direction, region, face, mirrors, reflections, path
+    return outcome, point, normal, ray.direction, region, face, mirrors, reflections, lamp, path
 
 
 def trace_path_codes(
@@ -172,13 +178,13 @@ def trace_chief_rays(
     width = dr.opaque(mi.UInt32, camera.width)
     x = mi.Float(index % width) + 0.5
     y = mi.Float(index // width) + 0.5
-    outcome, point, normal, arriving, region, face, mirrors, reflections, _path = _trace(
+    outcome, point, normal, arriving, region, face, mirrors, reflections, lamp, _path = _trace(
         scene, None, Ray(*camera.rays(x, y), mi.Bool(True))
     )
     incidence = -dr.dot(arriving, normal)
     if sensing_faces is None:
         sensing_faces = np.zeros(0, dtype=np.int64)
-    dr.eval(outcome, point, normal, arriving, region, face, mirrors, reflections, incidence)
+    dr.eval(outcome, point, normal, arriving, region, face, mirrors, reflections, lamp, incidence)
 
     def image(values: object) -> NDArray[np.float32]:
         return np.asarray(values, dtype=np.float32).T.reshape(*shape, 3)
@@ -195,6 +201,7 @@ def trace_chief_rays(
         region=np.asarray(region).astype(np.uint8).reshape(shape),
         mirrors=np.asarray(mirrors).astype(np.uint32).reshape(shape),
         reflections=np.asarray(reflections).astype(np.uint32).reshape(shape),
+        lamp=np.asarray(lamp).astype(np.uint32).reshape(shape),
     )
 
 
