@@ -23,9 +23,12 @@ from optisense.optics.scene.surfaces import CLEAR, Surface, SurfaceKind
 
 Colour = tuple[float, float, float]
 
-PATH_DEPTH = 64
-"""Largest number of surfaces of a path in the exported scene; longer paths carry far less than a
-thousandth of the light."""
+PATH_DEPTH = 256
+"""Largest number of surfaces of a path in the exported scene. Russian roulette ends most paths long
+before, so that a large limit hardly takes time. A mirroring skin and the faces of a slab guide
+light: on the skin of an acrylic slab at a specularity of 1, seen at 43 degrees, paths of more than
+32 surfaces carry 5 % of the light of the lamps beside the view, and paths of more than 64 surfaces
+0.4 %."""
 
 SPOT_PIXELS = 512
 """Side (pixels) of the bitmap that holds the profile of a spot light. With 512, a pixel of a spot
@@ -45,7 +48,6 @@ def mitsuba_scene(
     flux: Sequence[Colour],
     *,
     samples: int = 64,
-    max_depth: int = PATH_DEPTH,
     channel: int | None = None,
 ) -> dict[str, Any]:
     """Return a dictionary for ``mi.load_dict``.
@@ -58,7 +60,6 @@ def mitsuba_scene(
         camera: a perspective camera.
         flux: power (mW) per channel of each light of a group, in the order of the groups.
         samples: number of samples per pixel.
-        max_depth: largest path depth, counted as in Mitsuba.
         channel: channel (0 to 2 for R, G, B) whose refractive indices the scene has; the picture is
             exact in that channel only. By default all light has the mean index, as Mitsuba's
             dielectrics have a single index.
@@ -70,7 +71,7 @@ def mitsuba_scene(
     integrator = "volpath" if absorbing else "path"
     scene: dict[str, Any] = {
         "type": "scene",
-        "integrator": {"type": integrator, "max_depth": max_depth, "rr_depth": 16},
+        "integrator": {"type": integrator, "max_depth": PATH_DEPTH, "rr_depth": 16},
         "sensor": _sensor(camera, samples),
     }
     for number, piece in enumerate(pieces):

@@ -20,8 +20,6 @@ from optisense.optics.scene.surfaces import Region
 
 PASS_SAMPLES = 16
 """Number of samples per pixel in one call of Mitsuba, few enough for snapshots near their times."""
-DEPTH = 32
-"""Largest number of surfaces of a path; longer paths carry less than 0.1 % of the light."""
 
 
 def pieces_with(
@@ -38,12 +36,12 @@ def pieces_with(
 
 
 def scene_with(
-    model: OpticalModel, contact: Contact, size: tuple[int, int], samples: int, max_depth: int
+    model: OpticalModel, contact: Contact, size: tuple[int, int], samples: int
 ) -> dict[str, Any]:
     """Return the sensor and the indenter for `mi.load_dict`, seen by the sensor's camera."""
     parts, pieces, flux = pieces_with(model, contact)
     camera = model.camera(size)
-    return mitsuba_scene(pieces, parts.emitters, camera, flux, samples=samples, max_depth=max_depth)
+    return mitsuba_scene(pieces, parts.emitters, camera, flux, samples=samples)
 
 
 def render_path(case: Case, budget: float) -> list[Snapshot]:
@@ -51,7 +49,7 @@ def render_path(case: Case, budget: float) -> list[Snapshot]:
 
     Kernels are compiled before the time begins.
     """
-    scene = mi.load_dict(scene_with(case.model, ball(), RESOLUTION, PASS_SAMPLES, DEPTH))
+    scene = mi.load_dict(scene_with(case.model, ball(), RESOLUTION, PASS_SAMPLES))
     width, height = RESOLUTION
     total = np.zeros((height, width, 3))
     np.asarray(mi.render(scene, spp=PASS_SAMPLES, seed=0))

@@ -40,9 +40,6 @@ Render = Callable[[int], FloatArray]
 CACHE = Path(__file__).parent / ".cache"
 PASS_SAMPLES = 1_024
 """Number of samples per pixel in one call of the path tracer."""
-PATH_DEPTH = 64
-"""Largest number of surfaces of a path; with metal, longer paths carry less than a thousandth of
-the light."""
 LIGHT_PASSES = 4
 """Number of photon passes in a batch of light tracing."""
 FEWEST_FINE = 4
@@ -154,7 +151,7 @@ class Reference:
     def _path(self, effort: Effort) -> Render:
         rows, columns = self.window
         height, width = self.mask.shape
-        scene = scene_with(self.model, self.contact, (width, height), PASS_SAMPLES, PATH_DEPTH)
+        scene = scene_with(self.model, self.contact, (width, height), PASS_SAMPLES)
         scene["sensor"]["film"] |= {
             "crop_offset_x": int(columns.start),
             "crop_offset_y": int(rows.start),

@@ -12,7 +12,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.mitsuba_export import PATH_DEPTH, Colour, mitsuba_scene
+from benchmarks.mitsuba_export import Colour, mitsuba_scene
 from optisense.design.emitters import Intensity
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging.cached import render_cached
@@ -114,7 +114,7 @@ class ReferenceScene:
         layers = render_cached(light, scenes, self.camera, rays, windows, seed, plan, None, None)
         return self._scaled(layers.radiance)
 
-    def path(self, samples: int, seed: int = 0, max_depth: int = PATH_DEPTH) -> FloatArray:
+    def path(self, samples: int, seed: int = 0) -> FloatArray:
         """Mitsuba's path tracer: radiance (h, w, 3) of all groups together."""
         described = mitsuba_scene(
             self.pieces,
@@ -122,7 +122,6 @@ class ReferenceScene:
             self.camera,
             self.flux,
             samples=samples,
-            max_depth=max_depth,
         )
         return np.asarray(mi.render(mi.load_dict(described), seed=seed), dtype=np.float64)
 

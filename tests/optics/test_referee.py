@@ -11,13 +11,18 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from reference_scenes import (
+    REFEREE_RADIANCE,
     Colour,
+    ReferenceScene,
+    box,
     diffuse_coating,
     metal_coating,
     referee_scene,
 )
 
-from optisense.optics.scene.surfaces import Surface
+from optisense.optics.camera.projection import RayCamera
+from optisense.optics.scene.emitters import Emitter, EmitterShape
+from optisense.optics.scene.surfaces import Surface, SurfaceKind
 
 NO_SLAB, SLAB, SLAB_POINT = 0.24287, 0.26653, 0.531
 """Agreed means: the first two Mitsuba's, the last halfway between pbrt's and LuxCore's."""
@@ -100,3 +105,14 @@ def test_exported_scenes_still_render_as_recorded(name: str) -> None:
 
 def test_path_sees_no_point_light_through_smooth_glass() -> None:
     assert np.all(referee_scene(diffuse_coating(0.7), lights="point").path(4) == 0.0)
+
+
+def test_path_follows_light_over_a_hundred_reflections() -> None:
+    mirror = Surface(SurfaceKind.MIRROR, metal_eta=(0.0, 0.0, 0.0), metal_k=(1.0, 1.0, 1.0))
+    shaft = box("shaft", (-1, -5, 0), (1, 5, 200), mirror, without=["-z", "+z", "-y", "+y"])
+    lamp = Emitter(0, (0, 0, 0), (0, 0, 1), (0, 1, 0), EmitterShape.RECTANGLE, (10.0, 10.0))
+    camera = RayCamera((0, 0, 199), (1, 0, -1), (0, 1, 0), 0.1, 16, 12)
+    flux = (np.pi * 100.0 * REFEREE_RADIANCE,) * 3
+    got = ReferenceScene([shaft], [lamp], [flux], camera).path(512).mean()
+    # Mitsuba's roulette ends a twentieth of the paths at each of the last 85 reflections.
+    assert got == pytest.approx(REFEREE_RADIANCE, rel=0.1)
