@@ -164,10 +164,15 @@ class Running:
         self._thread.join()
 
 
-@pytest.fixture
-def running(tmp_path: Path) -> Iterator[tuple[Running, str, Path]]:
-    """A search, the address at which the command shows it, and its folder."""
-    folder = tmp_path / "study"
+@pytest.fixture(scope="module")
+def running(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Iterator[tuple[Running, str, Path]]:
+    """A search, the address at which the command shows it, and its folder.
+
+    It goes on until a test ends it; it is watched for all tests.
+    """
+    folder = tmp_path_factory.mktemp("watched") / "study"
     begun = Running(folder)
     try:
         for _ in range(4):
