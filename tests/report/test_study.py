@@ -17,7 +17,7 @@ from optisense.report import _study_figures as study_figures
 from optisense.report._cage_changes import cage_changes
 from optisense.report._pictures import figure_uri
 from optisense.report.before_after import DesignView, RayFigures
-from optisense.report.study import render_study, write_study_report
+from optisense.report.study import render_study
 from optisense.report.trial_pictures import Ball
 from optisense.search import Around, CagePoints, SearchResult, Study, search
 from optisense.search.study.failures import counted
@@ -186,18 +186,15 @@ def test_a_study_without_scores_has_a_page(tmp_path: Path) -> None:
 def test_the_command_writes_the_page(tmp_path: Path) -> None:
     folder = tmp_path / "study"
     search(ots.load("gelsight-mini-ideal"), SPACE, opposite, method="random", budget=5, out=folder)
+    before = {each.name for each in folder.iterdir()}
     done = CliRunner().invoke(app, ["report", str(folder), "--no-pictures"])
     assert done.exit_code == 0, done.output
-    assert "search for opposite" in (folder / "report.html").read_text(encoding="utf-8")
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    assert "search for opposite" in text and text.rstrip().endswith("</html>")
+    assert {each.name for each in folder.iterdir()} - before == {"report.html"}
     missing = CliRunner().invoke(app, ["report", str(tmp_path / "nothing")])
     assert missing.exit_code == 2
     assert "no study in this folder" in missing.output
-
-
-def test_a_page_is_written_whole_or_not_at_all(result: SearchResult, tmp_path: Path) -> None:
-    path = write_study_report(tmp_path / "page.html", result.study)
-    assert path.read_text(encoding="utf-8").rstrip().endswith("</html>")
-    assert [each.name for each in tmp_path.iterdir()] == ["page.html"]
 
 
 class TestInfluence:
