@@ -107,7 +107,7 @@ def test_directions_are_told_for_light_and_dark_pages(section: LightSection) -> 
 
 
 def test_the_command_writes_the_section(tmp_path: Path) -> None:
-    few = ["--photons", "20000", "--out", str(tmp_path)]
+    few = ["--photons", "20000", "--at", "-1,2", "--out", str(tmp_path)]
     done = CliRunner().invoke(app, ["ledger", "gelsight-svelte", *few])
     assert done.exit_code == 0, done.output
     page = (tmp_path / "ledger.html").read_text(encoding="utf-8")
@@ -116,3 +116,4 @@ def test_the_command_writes_the_section(tmp_path: Path) -> None:
     assert {"absorbed by a part"} == {
         entry["kind"] for entry in data["entries"] if entry["where"] == "absorbed by body"
     }
+    assert "light at (-1, 2) mm" in done.output
