@@ -96,12 +96,12 @@ def test_less_noise_confuses_less(tmp_path: Path) -> None:
             "design": sensor("gelsight-mini-ideal"),
             "objective": "normdiff",
             "variants": variants,
-            "settings": IMAGES,
+            "settings": PRESSES,
         },
         tmp_path,
     ).values
     assert found["scores"]["little"] > found["scores"]["much"]
-    assert len(found["pixels"]) == 9
+    assert len(found["pixels"]) == len(PRESSES["places"])
 
 
 @pytest.mark.parametrize("name", list(OBJECTS))
@@ -149,13 +149,12 @@ def test_a_task_is_read_and_its_samples_kept(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("method", ["cma-es", "gradient"])
-def test_a_searched_mirror_can_be_built_again(method: str, tmp_path: Path) -> None:
+def test_a_searched_mirror_can_be_built_again(tmp_path: Path) -> None:
     asked: dict[str, Any] = {
         "design": sensor("gelsight-svelte"),
         "space": {"cages.M1.blend": [0.0, 1.0]},
         "objectives": ["aoap"],
-        "method": method,
+        "method": "cma-es",
         "budget": 3,
         "seed": 2,
         "settings": {"ray_resolution": [32, 24]},
