@@ -183,7 +183,7 @@ evaluations at lower quality; this one takes less than half a minute:
 
 ```console
 $ python -m paper
-$ python -m paper svelte-mirror --quick --seeds 1 --out quick-results
+$ python -m paper svelte-mirror --quick --seeds 1 --workers 1 --out quick-results
 ```
 
 All experiments in full take about an hour and a half on two processors:
