@@ -45,8 +45,14 @@ FOV = {"camera.fov": (40.0, 60.0, 6)}
 
 def searched(design: SensorDesign, goal: Any = "aoap", **given: Any) -> SearchResult:
     """The result of a grid search over the field of view, unless other arguments are given."""
-    usual = {"space": FOV, "method": "grid", "settings": RAYS if isinstance(goal, str) else None}
+    usual = {"space": FOV, "method": "grid", "settings": RAYS}
     return search(design, objective=goal, **{**usual, **given})
+
+
+@pytest.fixture(scope="module")
+def free(mini: SensorDesign) -> SearchResult:
+    """The result without conditions: a narrow view looks straight at the skin, but sees less."""
+    return searched(mini)
 
 
 def outcome(score: float, **conditions: float) -> Outcome:
@@ -168,10 +174,10 @@ def test_a_trial_that_breaks_a_condition_is_never_the_best(
     assert note is not None and "trial 1 comes nearest: coverage >= 0.5 (is 0.45)" in note
 
 
-@pytest.mark.parametrize("method", ["grid", "random", "cma-es"])
-def test_the_best_of_a_search_keeps_the_condition(mini: SensorDesign, method: str) -> None:
-    """A narrow field of view looks straight at the skin, but sees less of it."""
-    free = searched(mini, method=method, budget=6)
+@pytest.mark.parametrize("method", ["grid", "cma-es"])
+def test_the_best_of_a_search_keeps_the_condition(
+    mini: SensorDesign, free: SearchResult, method: str
+) -> None:
     assert free.best.parts["aoap"]["coverage"] < 0.4
     limit = "coverage >= 0.5"
     result = searched(mini, method=method, budget=6, require=limit)
@@ -182,8 +188,8 @@ def test_the_best_of_a_search_keeps_the_condition(mini: SensorDesign, method: st
 
 
 def test_a_front_holds_no_trial_that_breaks_a_condition(mini: SensorDesign) -> None:
-    goals, options = ["aoap", "coverage"], {"population": 8}
-    given: dict[str, Any] = {"method": "pareto", "budget": 24, "settings": RAYS}
+    goals, options = ["aoap", "coverage"], {"population": 6}
+    given: dict[str, Any] = {"method": "pareto", "budget": 12, "settings": RAYS}
     result = searched(mini, goals, options=options, require=["coverage >= 0.5"], **given)
     assert result.front
     assert all((trial.conditions["coverage >= 0.5"] or 0.0) >= 0.5 for trial in result.front)
@@ -204,7 +210,7 @@ def test_nothing_that_meets_the_conditions_is_told_with_the_nearest(mini: Sensor
 def test_a_study_with_conditions_goes_on_and_old_ones_do_too(
     mini: SensorDesign, tmp_path: Path
 ) -> None:
-    given: dict[str, Any] = {"method": "random", "budget": 3, "out": tmp_path / "study"}
+    given: dict[str, Any] = {"method": "random", "budget": 2, "out": tmp_path / "study"}
     first = searched(mini, require="coverage>=0.6", **given)
     again = searched(mini, require="coverage >= 0.6", resume=True, **given)
     assert [t.score for t in again.trials] == [t.score for t in first.trials]
@@ -241,7 +247,7 @@ def test_a_condition_that_fresh_seeds_break_is_judged_anew(mini: SensorDesign) -
         assert [trial.outcome.is_feasible for trial in found.trials] == [True] * 7
         assert found.best.values["camera.fov"] == 48.0
         assert found.best.is_feasible and found.best.fresh
-        everywhere = {"camera.fov": (50.0, 60.0, 3)}
+        everywhere = {"camera.fov": (50.0, 60.0, 2)}
         start = set_value(mini, "camera.fov", 50.0)
         none = searched(start, wide, space=everywhere, require="lucky >= 0.5")
         assert none.study.best is None
@@ -270,7 +276,7 @@ def test_what_fresh_seeds_say_of_conditions_is_stored(mini: SensorDesign, tmp_pa
 def test_nine_of_ten_manufactured_sensors_meet_a_condition(mini: SensorDesign) -> None:
     """A field of view that is 2 degrees off at random: the best keeps some distance."""
     limit = "coverage >= 0.5"
-    given: dict[str, Any] = {"space": {"camera.fov": (50.0, 56.0, 7)}, "require": limit}
+    given: dict[str, Any] = {"space": {"camera.fov": (50.0, 56.0, 3)}, "require": limit}
     plain = searched(mini, **given)
     robust = searched(mini, errors={"camera.fov": 2.0}, samples=12, **given)
     assert robust.best.values["camera.fov"] > plain.best.values["camera.fov"]
@@ -303,11 +309,10 @@ def test_a_condition_without_a_value_on_manufactured_sensors_has_a_reason(
     assert tally.failed == 0
 
 
-def test_a_score_won_by_seeing_less_is_told(mini: SensorDesign) -> None:
-    result = searched(mini)
-    assert set(result.start.parts[WATCHED]) == {"coverage", "distortion"}
-    assert any("--require 'coverage>=" in note for note in result.notes), result.notes
-    assert worsened_note(result.start, result.start) is None
+def test_a_score_won_by_seeing_less_is_told(free: SearchResult) -> None:
+    assert set(free.start.parts[WATCHED]) == {"coverage", "distortion"}
+    assert any("--require 'coverage>=" in note for note in free.notes), free.notes
+    assert worsened_note(free.start, free.start) is None
 
 
 def test_a_score_won_by_reading_worse_is_told(mini: SensorDesign) -> None:
