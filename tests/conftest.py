@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import gc
 import signal
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import warm_python
 
 # A shell that starts a program in the background lets it ignore Ctrl-C, and so do the programs that
 # it starts. Tests press Ctrl-C.
@@ -29,3 +31,9 @@ def _nothing_of_the_user(tmp_path_factory: pytest.TempPathFactory) -> Iterator[N
         patch.setenv("OPTISENSE_LIBRARY", str(folder / "no-own-library"))
         patch.setenv("XDG_STATE_HOME", str(folder / "state"))
         yield
+
+
+@pytest.fixture
+def forks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let programs that are started by `sys.executable` be forks of one warm process."""
+    monkeypatch.setattr(sys, "executable", str(warm_python.programs() / "python"))

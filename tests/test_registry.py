@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import warm_python
 
 import optisense.design.lenses  # noqa: F401  defines further kinds
 from optisense import sensors
@@ -107,7 +108,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def command(site: Path, *arguments: str) -> list[str]:
     """An `optisense` command in a process that has the package."""
     start = f"import sys; sys.path.insert(0, {str(site)!r}); from optisense.cli import main; main()"
-    return [sys.executable, "-c", start, *arguments]
+    return [str(warm_python.programs() / "python"), "-c", start, *arguments]
 
 
 def run(site: Path, folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:

@@ -125,6 +125,8 @@ def import_all() -> None:
     # Commands load these only when they need them, as each takes up to a second.
     for name in ("matplotlib.figure", "scipy.stats", "sklearn.ensemble", "sklearn.neural_network"):
         import_module(name)
+    with contextlib.suppress(ImportError):  # the extra 'step'
+        import_module("OCP.STEPCAFControl")
 
     import optisense.cli
     import optisense.commands.rendering
@@ -225,6 +227,7 @@ def run(
     os.chdir(folder)
     os.environ.clear()
     os.environ.update(environment)
+    sys.path[1:1] = filter(None, environment.get("PYTHONPATH", "").split(os.pathsep))
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
     def work() -> Any:

@@ -96,10 +96,10 @@ def struck(design):
     return told(design)
 
 def crowded(design):
-    """The same, and from 0.6 on waits until five processes have come to work."""
+    """The same, and from 0.6 on waits until three processes have come to work."""
     folder = Path(os.environ["CROWD"])
     (folder / str(os.getpid())).touch()
-    while design.coating.specularity >= 0.6 and len(list(folder.iterdir())) < 5:
+    while design.coating.specularity >= 0.6 and len(list(folder.iterdir())) < 3:
         time.sleep(0.01)
     return struck(design)
 

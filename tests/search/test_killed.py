@@ -50,10 +50,13 @@ def test_kill_9_amid_a_generation(
     goals_folder: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
+    request: pytest.FixtureRequest,
 ) -> None:
     """The 16th call kills the study in the third generation of six (the start comes first)."""
     log, folder = tmp_path / "log", tmp_path / "study"
     monkeypatch.setenv("TRIAL_LOG", str(log))
+    if workers == 1:  # a worker that is a fork has another parent than its study
+        request.getfixturevalue("forks")
     child = subprocess.run(
         [sys.executable, "-c", SCRIPT, str(folder), str(workers)],
         env={
@@ -73,6 +76,7 @@ def test_kill_9_amid_a_generation(
     assert 13 <= len(done) <= 16
     assert len(done) < len(rows)  # it was amid a generation
 
+    request.getfixturevalue("forks")
     before = calls(log)
     result = search(
         mini, SPACE, goals.told, budget=BUDGET, seed=7, workers=workers, out=folder, resume=True

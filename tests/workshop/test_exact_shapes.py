@@ -95,6 +95,7 @@ class TestRecognised:
 
 
 @needs_step
+@pytest.mark.usefixtures("forks")
 class TestStepFiles:
     def test_a_cut_cylinder_is_round_again(self, tmp_path: Path) -> None:
         found = volume_read(plate_with_a_hole(48), tmp_path)

@@ -155,6 +155,7 @@ def test_overlapping_bodies_of_a_part_are_one(flat: SensorDesign) -> None:
 
 
 @needs_step
+@pytest.mark.usefixtures("forks")
 def test_a_part_of_several_bodies_as_a_step_file(tmp_path: Path) -> None:
     from optisense.geometry.step import read_step
 

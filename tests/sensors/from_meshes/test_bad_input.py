@@ -176,6 +176,7 @@ class TestFiles:
         assert "all.obj holds 2 objects (gel, plate)" in str(caught.value.hint)
 
     @needs_step
+    @pytest.mark.usefixtures("forks")
     def test_bodies_of_a_step_file_whose_names_say_nothing(self, tmp_path: Path) -> None:
         from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 

@@ -310,6 +310,7 @@ def test_an_indenter_is_kept_for_reference(cad: Any) -> None:
 
 
 @needs_step
+@pytest.mark.usefixtures("forks")
 class TestStep:
     """All parts in one STEP file, exact and in millimetres."""
 

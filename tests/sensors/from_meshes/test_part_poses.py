@@ -108,6 +108,7 @@ def test_a_single_light_beside_a_long_side_is_not_beyond_it(cad: Cad) -> None:
     assert "1 of 1 are beyond the ends of plate, which is 24 mm long along x" in note
 
 
+@pytest.mark.usefixtures("forks")
 def test_file_names_tell_what_a_nameless_body_is(tmp_path: Path) -> None:
     pytest.importorskip("OCP")
     from optisense.design import Role
