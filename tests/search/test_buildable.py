@@ -6,6 +6,7 @@ The points are winners of `benchmarks/single_parameters.py` that a person would 
 from __future__ import annotations
 
 import pickle
+from functools import cache
 
 import numpy as np
 import pytest
@@ -19,11 +20,13 @@ from optisense.search.space.search_space import SearchSpace
 
 RAYS = {"ray_resolution": (40, 30)}
 
+load = cache(sensors.load)
+
 
 def evaluator(name: str, path: str, apart: bool = True) -> DesignEvaluator:
     """Of a space with one parameter that reaches far."""
     space = SearchSpace({path: (1.0, 4.0) if path.endswith("ior") else (-200.0, 200.0)})
-    bound = space.bind(sensors.load(name), tried=False)
+    bound = space.bind(load(name), tried=False)
     return DesignEvaluator(bound, ["aoap"], RAYS, apart=apart)
 
 
@@ -92,7 +95,7 @@ def test_what_can_be_built_is_scored(name: str, path: str, value: float) -> None
 
 
 def test_parts_that_are_moved_together_keep_their_contact() -> None:
-    belt = sensors.load("gelbelt")
+    belt = load("gelbelt")
     paths = [f"parts.{part}.shift.x" for part in ("window", "film")]
     space = SearchSpace(dict.fromkeys(paths, (-20.0, 20.0))).bind(belt, tried=False)
     rest = PartsInContact(belt, {"window", "film"})
