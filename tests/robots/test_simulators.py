@@ -17,7 +17,15 @@ from optisense.design.projection import picture_places
 from optisense.errors import DesignError, OwnCodeError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.solids import as_manifold
-from optisense.robots import Frame, RobotFormat, SensorBody, Skin, export_robot, sensor_body
+from optisense.robots import (
+    ROBOT_FORMATS,
+    Frame,
+    RobotFormat,
+    SensorBody,
+    Skin,
+    export_robot,
+    sensor_body,
+)
 from optisense.robots._body import KILOGRAMS, _skin_frame, mass_properties
 from optisense.robots._collision import COVERED, depth_in
 from optisense.workshop.shapes import shapes
@@ -54,11 +62,23 @@ class Made(NamedTuple):
     urdf: Path
 
 
+def exported(design: SensorDesign, folder: Path, notes: list[str] | None = None) -> Made:
+    """Export a sensor once, with the body that its files are made of."""
+    bodies: list[SensorBody] = []
+
+    def keep(body: SensorBody, meshes: str) -> str:
+        bodies.append(body)
+        return ""
+
+    with ROBOT_FORMATS.forgetting():
+        ROBOT_FORMATS.register("kept", RobotFormat(".kept", keep))
+        mjcf, urdf, *_ = export_robot(design, folder, ["mujoco", "urdf", "kept"], notes)
+    return Made(design, bodies[0], mjcf, urdf)
+
+
 @pytest.fixture(scope="module", params=SHAPES)
 def made(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Made:
-    design = sensors.build(request.param)
-    mjcf, urdf, *_ = export_robot(design, tmp_path_factory.mktemp("robot"), ["mujoco", "urdf"])
-    return Made(design, sensor_body(design), mjcf, urdf)
+    return exported(sensors.build(request.param), tmp_path_factory.mktemp("robot"))
 
 
 def with_ball(made: Made, above: float, slides: bool = False, frame: Frame | None = None) -> Any:
@@ -193,10 +213,10 @@ def test_each_skin_has_a_touch_sensor_of_its_own(tmp_path: Path) -> None:
     back = back.with_vertices(back.vertices - (0.0, 0.0, 50.0))
     design.parts |= {"back": design.parts["skin"], "case": Part(role=Role.BLOCKER, mesh="case.obj")}
     design.meshes.update({"back": back, "case": TriangleMesh.box((-9, -9, -52), (9, 9, -48))})
-    body = sensor_body(design)
+    made = exported(design, tmp_path)
+    body = made.body
     assert all(isinstance(each, Skin) for each in body.skins)
     assert [each.suffix for each in body.skins] == ["-skin", "-back"]
-    made = Made(design, body, *export_robot(design, tmp_path, ["mujoco", "urdf"])[:2])
     assert 'name="gelsight-mini-ideal_skin-back"' in made.urdf.read_text()
     on_case = Frame(1e-3 * np.array([9.0, 0.0, -49.0]), np.eye(3)[:, [1, 2, 0]])
     for frame, weight in ((None, GRAVITY * BALL_MASS), (on_case, 0.0)):
@@ -253,8 +273,7 @@ def test_the_friction_of_the_gel_counts(tmp_path: Path) -> None:
     material = design.materials[design.parts["gel"].material]
     material.elasticity = material.elasticity.model_copy(update={"friction": 0.3})
     notes: list[str] = []
-    mjcf, urdf, *_ = export_robot(design, tmp_path, ["mujoco", "urdf"], notes)
-    model = with_ball(Made(design, sensor_body(design), mjcf, urdf), -SUNK)
+    model = with_ball(exported(design, tmp_path, notes), -SUNK)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     assert {contact.friction[0] for contact in data.contact} == {0.3}
