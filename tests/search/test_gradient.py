@@ -99,7 +99,8 @@ def test_rays_that_leave_the_picture_count_for_nothing_where_the_score_is_flat()
     assert np.abs(gradient).max() < 4e-3
 
 
-CAMERA = {"camera.position": Around(1.0), "camera.turn": Around(3.0), "camera.fov": Around(3.0)}
+CAMERA = {"camera.position": Around(1.0), "camera.fov": Around(3.0)}
+CAMERA_RAYS = {"ray_resolution": (320, 240)}
 
 
 class ScoredOnce(ScoreDifferences):
@@ -121,7 +122,7 @@ class ScoredOnce(ScoreDifferences):
 @pytest.fixture(scope="module")
 def belt() -> GradientEvaluator:
     """An evaluator of GelBelt's 2to3PW by its camera. Tests take the same steps from its start."""
-    evaluator = slopes_of(method(load("gelbelt"), CAMERA, "2to3pw"), "2to3pw", TRUE)
+    evaluator = slopes_of(method(load("gelbelt"), CAMERA, "2to3pw"), "2to3pw", CAMERA_RAYS)
     evaluator._differences = ScoredOnce(evaluator.usual)
     return evaluator
 
@@ -138,15 +139,16 @@ def test_an_unlikely_gradient_does_not_hold_and_a_true_one_does(belt: GradientEv
 
 def test_a_score_that_steps_is_said_to_have_no_steady_derivative() -> None:
     """The coverage in GelBelt's AOAP counts triangles, of which whole rows come into view."""
-    found = method(load("gelbelt"), CAMERA)
+    found = method(load("gelbelt"), CAMERA, resolution=RESOLUTION)
     bound = found.space
-    usual = DesignEvaluator(bound, ["aoap"], apart=False)
+    usual = DesignEvaluator(bound, ["aoap"], CAMERA_RAYS, apart=False)
     outcome = found.evaluator(usual)(bound.start, 0)
     assert not outcome.parts["aoap"][GRADIENT_HOLDS]
     found.tell(bound.start[None], [outcome])
     assert any("no steady derivative" in note and "cma-es" in note for note in found.notes())
     # The coverage alone makes the difference: the mean cosine has a derivative.
-    smooth = DesignEvaluator(bound, ["aoap"], {"coverage_weight": 0.0}, apart=False)
+    settings = {**CAMERA_RAYS, "coverage_weight": 0.0}
+    smooth = DesignEvaluator(bound, ["aoap"], settings, apart=False)
     assert found.evaluator(smooth)(bound.start, 0).parts["aoap"][GRADIENT_HOLDS]
 
 
