@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections import Counter
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,6 +19,9 @@ from optisense.workshop.shapes import Shape, shapes
 ROUND = 2e-3
 """Share by which the volume of a body with round faces may differ from that of its mesh, whose
 corners lie on them."""
+
+IN_STEP = tuple(each for each in sensors.SENSORS.names() if "ideal" not in each)
+"""Sensors whose STEP files are read; ideal GelSight Minis differ in the size of a plate only."""
 
 
 class Made(NamedTuple):
@@ -34,12 +38,11 @@ def made(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     design = sensors.build(request.param)
     folder = tmp_path_factory.mktemp("made")
     formats = ["3mf"]
-    try:
+    with suppress(ImportError):
         import OCP.STEPControl  # noqa: F401
 
-        formats.append("step")
-    except ImportError:
-        pass
+        if request.param in IN_STEP:
+            formats.append("step")
     notes: list[str] = []
     files = {file.name: file for file in export(design, folder, formats, notes)}
     assert notes == [], "every part is written with exact faces"
@@ -47,6 +50,7 @@ def made(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
 
 
 @needs_step
+@pytest.mark.parametrize("made", IN_STEP, indirect=True)
 def test_the_step_file(made: Made) -> None:
     """One assembly of named and coloured bodies, sound as it is, of the meshes' volumes."""
     from OCP.BRepCheck import BRepCheck_Analyzer
