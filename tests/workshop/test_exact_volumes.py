@@ -226,7 +226,7 @@ def drawn_volume(shape: Shape, axis: int = 1) -> float:
         for edge in each(face, TopAbs_EDGE):
             curve = BRepAdaptor_Curve(cast(edge))
             sign = -0.5 if edge.Orientation() == TopAbs_REVERSED else 0.5
-            cuts = np.linspace(curve.FirstParameter(), curve.LastParameter(), 200)
+            cuts = np.linspace(curve.FirstParameter(), curve.LastParameter(), 60)
             half = 0.5 * np.diff(cuts)
             steps = (cuts[:-1, None] + half[:, None] * (at + 1.0)).ravel()
             for step, weight in zip(steps, (half[:, None] * weights).ravel(), strict=True):
