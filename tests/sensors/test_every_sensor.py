@@ -21,7 +21,7 @@ from optisense.geometry import (
     TriangleMesh,
 )
 from optisense.geometry.containment import inside
-from optisense.optics import OpticalModel
+from optisense.optics import OpticalModel, TactileImage
 from optisense.optics.transport.chief_rays import RayOutcome
 
 from .conftest import ModelOf
@@ -97,13 +97,14 @@ def test_no_ray_of_the_picture_is_lost(model: OpticalModel) -> None:
         assert rays.hit.all()
 
 
-def shows(model: OpticalModel, indenter: Indenter) -> bool:
+def shows(
+    model: OpticalModel, indenter: Indenter, untouched: TactileImage, size: dict[str, Any]
+) -> bool:
     """Whether an indenter that is pressed into the middle of the view changes the picture there."""
-    size = FINE if model.design.name in WIDE else SMALL
     middle = model.nine_contacts()[4].point
     image = model.render([Contact(indenter, point=middle, depth=0.6)], **size)
     pressed = image.contact_mask
-    change = np.abs(image.radiance - model.render([], **size).radiance).max(axis=2)
+    change = np.abs(image.radiance - untouched.radiance).max(axis=2)
     # A plate shows by its rim: its flat face looks as the skin did. The ratio is 4.7 for a plate on
     # the tip of GelSight360, where little light comes from the sides, and 19 for a ball there.
     return bool(
@@ -119,5 +120,7 @@ def test_indenters_show(model: OpticalModel, tmp_path: Path) -> None:
         brick = tmp_path / "brick.obj"
         TriangleMesh.box((-2, -1.5, 0), (2, 1.5, 4)).save_obj(brick)
         indenters += [Cylinder(radius=2.0, length=4.0), Plane(size=4.0), MeshIndenter(brick)]
+    size = FINE if model.design.name in WIDE else SMALL
+    untouched = model.render([], **size)
     for each in indenters:
-        assert shows(model, each), each
+        assert shows(model, each, untouched, size), each
