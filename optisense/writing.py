@@ -24,9 +24,11 @@ FREE_SPACE = "Free space on this disk or choose another folder"
 
 
 def remedy(error: OSError, hint: str | None = None) -> str:
-    """Return the remedy for an error of writing: the caller's, or the one for its reason."""
-    if hint is None and error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return FREE_SPACE
+    """Return the remedy for an error of writing: to free space on a full disk, else the caller's or
+    the one for its reason. On a full disk a caller's hint that begins with `FREE_SPACE` is kept.
+    """
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return hint if hint is not None and hint.startswith(FREE_SPACE) else FREE_SPACE
     return hint or OutputError.of(error).hint or "Choose another folder"
 
 
@@ -70,7 +72,8 @@ def written_together(what: str, hint: str | None = None) -> Iterator[Callable[[P
 
     Args:
         what: word for the files in messages, such as "the design".
-        hint: remedy if it fails; by default, the one for the reason.
+        hint: remedy if it fails for another reason than a full disk (see `remedy`); by default, the
+            one for the reason.
 
     Raises:
         OutputError: in place of any `OSError`; no temporary file is left behind.

@@ -10,6 +10,7 @@ import pytest
 
 from optisense.errors import OutputError
 from optisense.writing import (
+    FREE_SPACE,
     remedy,
     remove_own_page,
     removed_together,
@@ -81,6 +82,10 @@ def test_the_remedy_fits_the_reason(tmp_path: Path) -> None:
         assert hint in str(caught.value.hint)
     assert remedy(OSError(errno.ENOSPC, "full")).startswith("Free space")
     assert remedy(OSError(errno.EIO, "broken")) == "Choose another folder"
+    for code in (errno.ENOSPC, errno.EDQUOT):
+        assert remedy(OSError(code, "full"), "Name a folder of yours") == FREE_SPACE
+        assert remedy(OSError(code, "full"), f"{FREE_SPACE}; 2 remain") == f"{FREE_SPACE}; 2 remain"
+    assert remedy(OSError(errno.EACCES, "no"), "Name a folder of yours") == "Name a folder of yours"
 
 
 def test_json_reads_back(tmp_path: Path) -> None:

@@ -18,9 +18,9 @@ from optisense.design.difference import plain_differences
 from optisense.design.problems import listed
 from optisense.errors import OutputError, TaskError
 from optisense.untrusted_files import COPY_AGAIN, read_json, read_table
-from optisense.writing import written_whole
+from optisense.writing import FREE_SPACE, written_whole
 
-KEPT = "Free space on this disk or choose another folder; finished samples are kept"
+KEPT = f"{FREE_SPACE}; finished samples are kept"
 
 
 def write_whole(path: Path, writer: Callable[[Path], object]) -> None:
