@@ -197,6 +197,9 @@ def parse_json(text: str, source: str, error: Error, what: str = "the file") -> 
 def read_table(path: Path, error: Error, by_hand: bool = False) -> list[dict[str, str]]:
     """Return the rows of a CSV file as text, by column.
 
+    A last line without a line break is left out of a table that is not written by hand: this
+    program was writing it, or could not finish it.
+
     Args:
         error: class of the exception to raise.
         by_hand: whether the table may be written by hand or by a spreadsheet program: its values
@@ -206,7 +209,9 @@ def read_table(path: Path, error: Error, by_hand: bool = False) -> list[dict[str
     Raises:
         error: the file can't be read, as in `read_text`, or is no such table; it names the line.
     """
-    text = read_text(path, MOST_TABLE, error, "the table")
+    data = read_bytes(path, MOST_TABLE, error, "the table")
+    whole = data if by_hand else data[: data.rfind(b"\n") + 1]
+    text = as_text(whole, str(path), error, "the table")
     separator = max(SEPARATORS, key=text.partition("\n")[0].count) if by_hand else ","
     reader = csv.DictReader(
         io.StringIO(text, newline=""), restval="" if by_hand else None, delimiter=separator

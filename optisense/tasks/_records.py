@@ -59,7 +59,8 @@ class CsvTable:
                 )
             if not path.exists():
                 write_whole(path, lambda file: file.write_text(heading, "utf-8"))
-            self._file = path.open("r+b")
+            # Without a buffer, which would keep what a full disk refuses, to be written later.
+            self._file = path.open("r+b", buffering=0)
             content = self._file.read()
             whole = content[: content.rfind(b"\n") + 1]
             self._file.truncate(len(whole))
@@ -78,12 +79,14 @@ class CsvTable:
         """Append a row completely or not at all; OutputError is raised if it cannot be written."""
         text = {name: _text(row[name]) for name in self.columns}
         before = self._file.tell()
+        left = _line(list(text.values())).encode("utf-8")
         try:
-            self._file.write(_line(list(text.values())).encode("utf-8"))
-            self._file.flush()
+            while left:  # a disk that becomes full takes a part of it, and refuses the next call
+                left = left[self._file.write(left) :]
             os.fsync(self._file.fileno())
         except OSError as error:
             self._file.truncate(before)
+            self._file.seek(before)
             raise _cannot_write(self.path, error) from error
         self.rows.append(text)
 

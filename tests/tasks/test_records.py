@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import hashlib
+import resource
 from pathlib import Path
 
 import pytest
 
 from optisense import load
 from optisense.design.difference import mesh_digests
-from optisense.errors import TaskError
+from optisense.errors import OutputError, TaskError
 from optisense.tasks._records import CsvTable, read_object, refuse_differences
+from optisense.untrusted_files import read_table
 
 COLUMNS = ("name", "value")
 ROWS = [{"name": 'a, "quoted" word', "value": 0.1}, {"name": "b", "value": 1 / 3}]
@@ -43,6 +45,34 @@ def test_cut_off_anywhere_it_continues_to_the_same_file(tmp_path: Path) -> None:
             table.add(row)
         table.close()
         assert path.read_bytes() == content
+
+
+def test_a_row_that_does_not_fit_on_the_disk_leaves_no_trace(tmp_path: Path) -> None:
+    """A limit on the size of files stops writing in the middle of a row, as a full disk does."""
+    path = tmp_path / "t.csv"
+    table = CsvTable(path, COLUMNS)
+    table.add(ROWS[0])
+    before = path.read_bytes()
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (len(before) + 3, limits[1]))
+    try:
+        with pytest.raises(OutputError, match="the results can't be written"):
+            table.add(ROWS[1])
+        assert path.read_bytes() == before
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    table.add(ROWS[1])
+    table.close()
+    assert path.read_bytes() == filled(tmp_path / "whole.csv").path.read_bytes()
+
+
+def test_readers_leave_out_a_row_that_is_being_written(tmp_path: Path) -> None:
+    content = filled(tmp_path / "t.csv").path.read_bytes()
+    row_cut_in_a_letter = "größe".encode()[:3]
+    (tmp_path / "t.csv").write_bytes(content + row_cut_in_a_letter)
+    assert [row["name"] for row in read_table(tmp_path / "t.csv", TaskError)] == [
+        row["name"] for row in ROWS
+    ]
 
 
 def test_other_columns_are_refused(tmp_path: Path) -> None:
