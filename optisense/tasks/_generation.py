@@ -41,7 +41,7 @@ from optisense.tasks.dataset_tables import (
     read_info,
     read_labels,
 )
-from optisense.untrusted_files import MOST_MESH, MOST_STEP, read_bytes
+from optisense.untrusted_files import MOST_MESH, MOST_PICTURE, MOST_STEP, damaged, read_bytes
 from optisense.writing import inside, write_json, written_whole
 
 if TYPE_CHECKING:
@@ -161,13 +161,15 @@ class _Maker:
             dataset.camera_rays()
         except TaskError:
             self._write_arrays(CAMERA, ray_arrays(self._model.chief_rays(self._resolution)))
-        damaged = set()
+        whole = self.done()
         for number, labels in enumerate(dataset.labels):
             try:
                 dataset[number]
+                if labels["radiance"] and labels["index"] in whole:
+                    _check_radiance(self._folder / labels["radiance"], self._resolution)
             except TaskError:
-                damaged.add(labels["index"])
-        return self.done() - damaged
+                whole.discard(labels["index"])
+        return whole
 
     def close(self) -> None:
         """Close the tables."""
@@ -390,6 +392,19 @@ def _file_digest(path: Path) -> str:
     """Return the SHA-256 of a file, which identifies an indenter when a dataset is continued."""
     content = read_bytes(path, max(MOST_MESH, MOST_STEP), TaskError, "the mesh")
     return hashlib.sha256(content).hexdigest()
+
+
+def _check_radiance(path: Path, resolution: tuple[int, int]) -> None:
+    """Raise TaskError if a file has no radiance of this size in pixels."""
+    from optisense.optics.imaging.radiance_files import decode_radiance
+
+    width, height = resolution
+    try:
+        radiance = decode_radiance(read_bytes(path, MOST_PICTURE, TaskError, "the radiance"))
+        if radiance.shape != (height, width, 3):
+            raise ValueError(f"its shape is {radiance.shape}")
+    except ValueError as found:
+        raise damaged(path, TaskError, "the radiance", found) from None
 
 
 def _save_arrays(arrays: dict[str, Any], path: Path) -> None:

@@ -116,15 +116,19 @@ class Dataset:
         return len(self.labels)
 
     def lacking(self) -> list[dict[str, Any]]:
-        """Return the labels of the samples that lack a file in the folder. Damaged files are found
-        when they are read.
+        """Return the labels of the samples that lack a file in the folder: the picture, the arrays
+        or, in a dataset with radiance, the radiance. Damaged files are found when they are read.
         """
 
         def has(name: str) -> bool:
             path = inside(self.folder, name)
             return path is not None and is_file(path)
 
-        return [row for row in self.labels if not (has(row["file_name"]) and has(row["arrays"]))]
+        def names(row: dict[str, Any]) -> list[str]:
+            radiance = [row["radiance"]] if row["radiance"] else []
+            return [row["file_name"], row["arrays"], *radiance]
+
+        return [row for row in self.labels if not all(map(has, names(row)))]
 
     def __getitem__(self, number: int) -> Sample:
         """Read a sample.

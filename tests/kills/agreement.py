@@ -9,11 +9,10 @@ import io
 from pathlib import PurePath
 from typing import Any
 
-import mitsuba as mi
 import numpy as np
 from PIL import Image
 
-from optisense.optics.backend.variant import threads_for_exr_files
+from optisense.optics.imaging.radiance_files import decode_radiance
 
 TOLERANCE = 1e-3
 """Mean difference of two arrays, of the largest value, that rounding makes at most. Rays that it
@@ -69,34 +68,8 @@ def _arrays(suffix: str, data: bytes) -> dict[str, Any]:
         with np.load(io.BytesIO(data)) as file:
             return dict(file)
     if suffix == ".exr":
-        if not _whole_exr(data):
-            raise ValueError("the EXR file is cut off")
-        stream = mi.MemoryStream()
-        stream.write(data)
-        stream.seek(0)
-        with threads_for_exr_files():
-            return {"": np.array(mi.Bitmap(stream), dtype=float)}
+        return {"": decode_radiance(data).astype(float)}
     return {}
-
-
-def _whole_exr(data: bytes) -> bool:
-    """Whether an EXR file of one part has all blocks of pixels that its table of offsets names.
-
-    Mitsuba's reader leaves the pixels of missing blocks as whatever the memory held before, which
-    may be the whole picture. The layout is that of "OpenEXR File Layout" (openexr.com): magic
-    number and version (8 bytes), attributes (name, type, size, value) ended by a zero byte, the
-    offset of each block, and the blocks (line number, size, pixels).
-    """
-    at = 8
-    while data[at] != 0:
-        for _ in ("name", "type"):
-            at = data.index(b"\0", at) + 1
-        at += 4 + int.from_bytes(data[at : at + 4], "little")
-    table = at + 1
-    first = int.from_bytes(data[table : table + 8], "little")
-    offsets = np.frombuffer(data[table:first], "<u8")
-    last = int(offsets.max())
-    return last + 8 + int.from_bytes(data[last + 4 : last + 8], "little") == len(data)
 
 
 def _near(one: Any, other: Any) -> bool:

@@ -16,6 +16,7 @@ from scipy.ndimage import binary_erosion
 from optisense import OpticalModel, SensorDesign, library, load, set_value
 from optisense.design import LightGroup
 from optisense.errors import ContactError, OutputError, TaskError
+from optisense.optics.imaging.radiance_files import decode_radiance
 from optisense.tasks import ContactDraw, Dataset, DatasetSettings, generate
 from optisense.tasks.dataset_tables import LATER_COLUMNS
 
@@ -59,15 +60,22 @@ def test_missing_and_damaged_samples_are_made_again(
     folder = tmp_path / "copy"
     shutil.copytree(made.folder, folder)
     missing = folder / made.labels[0]["file_name"]
+    lost = folder / made.labels[2]["radiance"]
     missing.unlink()
+    lost.unlink()
     arrays = folder / made.labels[1]["arrays"]
     arrays.write_bytes(arrays.read_bytes()[:100])
+    cut = folder / made.labels[3]["radiance"]
+    whole = cut.read_bytes()
+    cut.write_bytes(whole[:-1])
     damaged = generate(mini, folder, COUNT, SETTINGS)  # which reads no sample
     made_again = missing.stat().st_mtime_ns
+    assert lost.exists() and len(cut.read_bytes()) == len(whole) - 1
     with pytest.raises(TaskError, match="sample 1"):
         damaged[1]
     assert_same(made, generate(mini, folder, COUNT, SETTINGS, mend=True))
     assert missing.stat().st_mtime_ns == made_again  # before, without `mend`
+    assert np.allclose(decode_radiance(cut.read_bytes()), decode_radiance(whole), rtol=1e-3)
 
 
 def test_labels_are_true(made: Dataset, mini: OpticalModel) -> None:
