@@ -11,7 +11,6 @@ import json
 import math
 import re
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +19,12 @@ from numpy.typing import NDArray
 
 from optisense.errors import SetupError, TaskError
 from optisense.folders import held
-from optisense.tasks._records import write_whole
+from optisense.tasks._records import KEPT
 from optisense.tasks._splits import SPLITS, TRAIN
 from optisense.tasks.dataset import LATER_ARRAYS, SAMPLE_ARRAYS, Dataset, Sample
 from optisense.tasks.dataset_tables import NUMBER_COLUMNS, WHOLE_COLUMNS
 from optisense.untrusted_files import MOST_PICTURE, read_bytes
-from optisense.writing import inside
+from optisense.writing import inside, removed_together, written_together
 
 FOLDER = "parquet"
 
@@ -69,7 +68,8 @@ def write_parquet(
 ) -> list[Path]:
     """Write all samples into the folder `parquet` of a dataset, a few files for each split.
 
-    Samples of a release without splits are all in "train". Files of an earlier call are removed.
+    Samples of a release without splits are all in "train". The files appear together, in place of
+    those of an earlier call, which stay if this one fails or is interrupted.
 
     Args:
         progress: function that is called with the number of samples written and their total number.
@@ -92,7 +92,11 @@ def write_parquet(
         if progress is not None:
             progress(done, len(dataset))
 
-    with held(dataset.folder):
+    with (
+        held(dataset.folder),
+        removed_together() as remove,
+        written_together("the results", KEPT) as stage,
+    ):
         for split in SPLITS:
             numbers = [
                 k for k, row in enumerate(dataset.labels) if (row["split"] or TRAIN) == split
@@ -102,12 +106,12 @@ def write_parquet(
                 of_file = numbers[part * SAMPLES_OF_A_FILE : (part + 1) * SAMPLES_OF_A_FILE]
                 name = f"{FOLDER}/{split}-{part:05d}-of-{count:05d}.parquet"
                 file = inside(dataset.folder, name)
-                write_whole(file, partial(_write, dataset=dataset, numbers=of_file, report=report))
+                _write(stage(file), dataset, of_file, report)
                 files.append(file)
         if files:
             for other in files[0].parent.iterdir():
-                if other not in files and OWN_FILE.fullmatch(other.name):
-                    other.unlink()
+                if OWN_FILE.fullmatch(other.name):
+                    remove(other)
     return files
 
 

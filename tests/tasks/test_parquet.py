@@ -16,7 +16,7 @@ from PIL import Image
 
 from optisense import OpticalModel
 from optisense.errors import TaskError
-from optisense.tasks import ContactDraw, Dataset, DatasetSettings, generate
+from optisense.tasks import ContactDraw, Dataset, DatasetSettings, generate, parquet
 from optisense.tasks._splits import SPLITS
 from optisense.tasks.data_card import OURS, write_card
 from optisense.tasks.parquet import ARRAYS, write_parquet
@@ -82,6 +82,24 @@ def test_files_of_an_earlier_call_go_and_others_stay(made: Dataset) -> None:
     (folder / "mine.parquet").write_bytes(b"mine")
     assert write_parquet(made) == files
     assert {file.name for file in folder.iterdir()} == {*(f.name for f in files), "mine.parquet"}
+
+
+def test_an_interrupted_call_leaves_the_files_of_an_earlier_one(
+    made: Dataset, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = write_parquet(made)[0].parent
+    before = {file.name: file.read_bytes() for file in folder.iterdir()}
+    monkeypatch.setattr(parquet, "SAMPLES_OF_A_FILE", 1)
+
+    def press(done: int, count: int) -> None:
+        if done == count:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_parquet(made, press)
+    assert {file.name: file.read_bytes() for file in folder.iterdir()} == before
+    files = write_parquet(made)
+    assert len(files) == len(made) and set(folder.glob("t*.parquet")) <= set(files)
 
 
 def test_the_card_tells_licence_seed_versions_and_splits(made: Dataset) -> None:
