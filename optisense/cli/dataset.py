@@ -42,7 +42,8 @@ def dataset(
         bool,
         typer.Option(
             "--parquet",
-            help="Also write all samples as Parquet files, which Hugging Face's datasets loads.",
+            help="Also write all samples as Parquet files, which Hugging Face's datasets loads. "
+            "Existing ones are always written again.",
         ),
     ] = False,
     licence: Annotated[
@@ -60,10 +61,11 @@ def dataset(
     not changed.
     """
     from optisense.tasks.data_card import check_licence, write_card
-    from optisense.tasks.parquet import require_parquet, write_parquet
+    from optisense.tasks.parquet import parquet_files, require_parquet, write_parquet
 
     check_licence(licence)
-    if parquet:
+    again = bool(parquet_files(out)) and not parquet
+    if parquet or again:
         require_parquet()
     try:
         with progress_line() as line:
@@ -75,7 +77,7 @@ def dataset(
             model = load_sensor(line, design, out, variant, settings.resolution)
             show = sample_progress(line, model, "samples", "reading the dataset")
             made = generate(model, out, count, settings, show, mend=mend)
-            if parquet:
+            if parquet or again:
                 line.begin("writing Parquet files")
                 write_parquet(made, line.advance)
             write_card(made, licence)
@@ -90,6 +92,8 @@ def dataset(
             )
         raise
     _print_summary(made, count)
+    if again:
+        messages.print("the folder's Parquet files were written again, with all samples")
 
 
 def _print_summary(made: Dataset, count: int) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from optisense.errors import TaskError
 from optisense.tasks._splits import SPLITS
 from optisense.tasks.dataset import Dataset
-from optisense.tasks.parquet import FOLDER
+from optisense.tasks.parquet import FOLDER, parquet_files
 from optisense.text import markdown
 from optisense.untrusted_files import MOST_TEXT, read_bytes
 from optisense.writing import write_text
@@ -35,6 +35,9 @@ def check_licence(licence: str | None) -> None:
 
 def write_card(dataset: Dataset, licence: str | None = None) -> Path | None:
     """Write the card into the dataset's folder.
+
+    It names the splits of the Parquet files in the folder. After `generate` has added samples,
+    `write_parquet` comes first, as files of fewer samples would be loaded as the whole dataset.
 
     Args:
         licence: an identifier such as cc-by-4.0. With None the licence of an existing card is kept,
@@ -69,9 +72,10 @@ def card_text(dataset: Dataset, licence: str | None = None) -> str:
     size = next((word for word, below in SIZES if len(dataset) < below), "n>1M")
     head = ["---", f"license: {licence or 'unknown'}", "tags:", "- tactile", "- synthetic"]
     head += ["size_categories:", f"- {size}"]
-    if (dataset.folder / FOLDER).is_dir():
+    of_files = {file.name.partition("-")[0] for file in parquet_files(dataset.folder)}
+    if of_files:
         head += ["configs:", "- config_name: default", "  data_files:"]
-        for name in splits:
+        for name in sorted(of_files, key=SPLITS.index):
             head += [f"  - split: {name}", f"    path: {FOLDER}/{name}-*.parquet"]
     width, height = settings["resolution"]
     versions = ", ".join(

@@ -59,8 +59,15 @@ def require_parquet() -> None:
     except ImportError as error:
         raise SetupError(
             "writing Parquet files needs PyArrow, which is not installed",
-            hint="pip install 'optisense[parquet]', or leave --parquet out",
+            hint="pip install 'optisense[parquet]', or leave --parquet out and delete the folder "
+            f"'{FOLDER}' of the dataset, if it is there",
         ) from error
+
+
+def parquet_files(folder: Path) -> list[Path]:
+    """Return the files that `write_parquet` has written into a dataset's folder, by name."""
+    found = (folder / FOLDER).glob("*.parquet")
+    return sorted(file for file in found if OWN_FILE.fullmatch(file.name))
 
 
 def write_parquet(
@@ -108,10 +115,8 @@ def write_parquet(
                 file = inside(dataset.folder, name)
                 _write(stage(file), dataset, of_file, report)
                 files.append(file)
-        if files:
-            for other in files[0].parent.iterdir():
-                if OWN_FILE.fullmatch(other.name):
-                    remove(other)
+        for earlier in parquet_files(dataset.folder) if files else ():
+            remove(earlier)
     return files
 
 

@@ -7,7 +7,9 @@ import subprocess
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
+import yaml
 from comparing import same_pictures
 from typer.testing import CliRunner
 from warm_python import programs
@@ -27,12 +29,20 @@ def run(*arguments: str) -> tuple[int, str]:
 def test_a_dataset_is_made_and_continued(tmp_path: Path) -> None:
     folder = tmp_path / "not" / "yet"
     options = (*SMALL, "--indenter", "sphere:2", "--indenter", "cylinder:1,3", "--depth", "0.5")
-    code, text = run("gelsight-mini-ideal", "--out", str(folder), "--count", "2", *options)
+    code, text = run(
+        "gelsight-mini-ideal", "--out", str(folder), "--count", "2", *options, "--parquet"
+    )
     assert code == 0, text
     assert "2 samples" in text
     assert "no sample is in the split" in text
     code, text = run("gelsight-mini-ideal", "--out", str(folder), "--count", "3", *options)
     assert code == 0, text
+    assert "Parquet files were written again" in text
+    files = sorted((folder / "parquet").iterdir())
+    assert sum(len(pq.read_table(file)) for file in files) == 3
+    card = yaml.safe_load((folder / "README.md").read_text("utf-8").split("---")[1])
+    named = [each["path"] for each in card["configs"][0]["data_files"]]
+    assert sorted(file for path in named for file in folder.glob(path)) == files
     made = Dataset.load(folder)
     assert [labels["index"] for labels in made.labels] == [0, 1, 2]
     assert {labels["depth"] for labels in made.labels} == {0.5}
