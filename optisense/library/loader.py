@@ -13,7 +13,7 @@ from optisense.design.materials import CoatingModel, Material
 from optisense.design.yaml_reader import read_yaml
 from optisense.errors import LibraryError
 from optisense.library._entries import AnyEntry, CameraModel
-from optisense.library.storage import KINDS, Kind, make_entry, own_files, read_entry
+from optisense.library.storage import KINDS, Kind, make_entry, own_file, own_names, read_entry
 from optisense.near import suggestion
 
 FOLDER = Path(__file__).parent
@@ -29,7 +29,7 @@ def names(kind: str) -> list[str]:
         LibraryError: there is no such kind.
     """
     singular = kind_named(kind)
-    return sorted({*_built_in(singular), *own_files(singular)})
+    return sorted({*_built_in(singular), *own_names(singular)})
 
 
 def is_own(kind: str, name: str) -> bool:
@@ -38,7 +38,7 @@ def is_own(kind: str, name: str) -> bool:
     Raises:
         LibraryError: there is no such kind.
     """
-    return name in own_files(kind_named(kind))
+    return own_file(kind_named(kind), name) is not None
 
 
 def entry(kind: str, name: str) -> AnyEntry:
@@ -49,15 +49,15 @@ def entry(kind: str, name: str) -> AnyEntry:
             file of it can't be read, or it has the name of a built-in one.
     """
     singular = kind_named(kind)
-    entries, own = _built_in(singular), own_files(singular)
-    if name in own:
+    entries, own = _built_in(singular), own_file(singular, name)
+    if own is not None:
         if name in entries:
             raise LibraryError(
                 f"{singular} '{name}' is built in, and also one of your own parts",
-                where=str(own[name]),
+                where=str(own),
                 hint="Give your file another name",
             )
-        return read_entry(singular, own[name])
+        return read_entry(singular, own)
     if name not in entries:
         hint = suggestion(name, names(singular), limit=25)
         raise LibraryError(f"the library has no {singular} '{name}'", hint=hint)

@@ -118,11 +118,19 @@ def own_folder() -> Path:
     return base / "optisense" / "library"
 
 
-def own_files(kind: Kind) -> dict[str, Path]:
-    """Return the files of the user's own entries of a kind, by name."""
-    folder = own_folder() / f"{kind}s"
-    files = sorted(folder.glob("*.yaml")) if folder.is_dir() else []
-    return {file.stem: file for file in files if not file.name.startswith(".")}
+def own_names(kind: Kind) -> set[str]:
+    """Return the names of the user's own entries of a kind."""
+    files = (own_folder() / f"{kind}s").glob("*.yaml")
+    return {file.stem for file in files if not file.name.startswith(".")}
+
+
+def own_file(kind: Kind, name: str) -> Path | None:
+    """Return the file of the user's own entry of this name, without listing the folder; None if
+    there is no such entry.
+    """
+    file = own_folder() / f"{kind}s" / f"{name}.yaml"
+    leads_elsewhere = name != file.stem or name.startswith(".")
+    return file if not leads_elsewhere and os.path.lexists(file) else None
 
 
 def write_own(

@@ -217,6 +217,21 @@ class TestRefusals:
             library.material("acrylic")
         assert library.material("pdms").kind == "dielectric"
 
+    def test_an_entry_is_found_without_a_list_of_its_folder(
+        self, own: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Else, reading all entries would take a time that grows with their number squared."""
+        (own / "materials").mkdir(parents=True)
+        write(own / "materials", "our-gel.yaml", GEL)
+        write(own / "materials", ".hidden.yaml", GEL)
+        assert library.names("material").count("our-gel") == 1
+        assert ".hidden" not in library.names("material")
+        monkeypatch.setattr(Path, "glob", None)
+        assert library.entry("material", "our-gel").description == "Our gel"
+        assert library.is_own("material", "our-gel")
+        for other in ("../materials/our-gel", ".hidden", "", "our-gel/", "our-gel\0", "n" * 999):
+            assert not library.is_own("material", other)
+
     def test_a_broken_own_file_harms_only_its_own_name(self, own: Path) -> None:
         (own / "lights").mkdir(parents=True)
         write(own / "lights", "broken.yaml", "value: {")
