@@ -282,7 +282,7 @@ def first_problem(error: ValidationError) -> str:
     place = ".".join(brief(str(step)) for step in report["loc"])
     if report["type"] == "missing":
         return f"'{place}' is missing"
-    if report["type"] == "extra_forbidden":
+    if report["type"] in ("extra_forbidden", "unexpected_keyword_argument"):  # of a dataclass
         return f"'{place}' is not known"
     given = report.get("input")
     plain = isinstance(given, str | int | float | bool | None)

@@ -233,3 +233,11 @@ def test_strange_settings_are_told(study: Path, tmp_path: Path) -> None:
                 pass
             else:
                 assert key in ("begun", "versions", "design")
+
+
+def test_a_setting_of_a_newer_release_is_told(study: Path) -> None:
+    path = study / "study.json"
+    path.write_text(json.dumps({**json.loads(path.read_text()), "of_tomorrow": 1}))
+    with pytest.raises(SearchError, match="'of_tomorrow' is not known") as caught:
+        Study.open(study)
+    assert "newer release" in str(caught.value.hint)

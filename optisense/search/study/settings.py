@@ -137,7 +137,8 @@ class StudySettings:
         if not isinstance(data, dict):
             raise SearchError("the study is no JSON object", where=str(path), hint=COPY_AGAIN)
         refuse_other_version("study", data.pop("study_version", None), STUDY_VERSION, path)
-        missing = {each.name for each in fields(StudySettings)} - data.keys() - set(OPTIONAL)
+        known = {each.name for each in fields(StudySettings)}
+        missing = known - data.keys() - set(OPTIONAL)
         if missing:
             names = ", ".join(sorted(missing))
             raise SearchError(f"{names} is missing", where=str(path), hint=COPY_AGAIN)
@@ -145,7 +146,9 @@ class StudySettings:
             schema = TypeAdapter(StudySettings)
             settings = schema.validate_json(json.dumps(data))  # the values as JSON has them
         except ValidationError as error:
-            raise SearchError(first_problem(error), where=str(path), hint=COPY_AGAIN) from None
+            newer = "A newer release may have written it: update OptiSense Studio"
+            hint = COPY_AGAIN if data.keys() <= known else newer
+            raise SearchError(first_problem(error), where=str(path), hint=hint) from None
         different, count = len(set(settings.names)), len(settings.objectives)
         if different != count:
             problem = f"'names' has {different} names for {count} objectives"
