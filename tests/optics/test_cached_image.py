@@ -88,20 +88,6 @@ def test_the_skin_beside_a_contact_has_the_light_that_the_contact_reflects_to_it
     assert 1.002 < usual / light() < 1.01
 
 
-def test_pixels_of_a_metal_contact_are_hardly_noisier_than_its_photons() -> None:
-    """At a specularity of 0.6: 1.2 % are of camera samples and their rays, 2.3 % of photons."""
-    design = build("gelsight-mini-ideal")
-    design.coating.specularity = 0.6
-    model = OpticalModel(design, "llvm")
-    ball = Contact(Sphere(radius=1.5), at=(0.0, 0.0), depth=0.8)
-    one, other = (
-        model.render([ball], (160, 120), 1_000_000, seed=seed, skin="conforming") for seed in (1, 2)
-    )
-    mask = one.contact_mask
-    off = (one.radiance - other.radiance)[mask] / np.sqrt(2)
-    assert np.sqrt((off**2).mean()) < 0.04 * one.radiance[mask].mean()
-
-
 def outline_error(light: np.ndarray, seen: np.ndarray) -> float:
     """Return the RMS deviation of the light (h, w) of the pixels at the outline of an area,
     relative to that of the nearest pixel inside, from the share of the area in them; ``seen`` is
