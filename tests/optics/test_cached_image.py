@@ -31,7 +31,7 @@ def test_noise_is_grainy_and_slopes_edges_of_the_mask_and_darkness_are_not() -> 
 
 def test_a_contact_may_fill_the_picture(plain_mini: OpticalModel) -> None:
     plate = Contact(Plane(size=60.0), at=(0.0, 0.0), depth=0.5)
-    image = plain_mini.render([plate], resolution=(32, 24), photons=100_000)
+    image = plain_mini.render([plate], (32, 24), photons=100_000, skin="conforming")
     assert image.contact_mask.all()
     assert (image.radiance.sum(axis=2) > 0).all()
 
