@@ -19,7 +19,7 @@ SHORT = 10_000
 the image to NumPy, and contains its size."""
 
 
-@pytest.mark.parametrize("specularity", [0.0, 0.6, 0.8, 1.0])
+@pytest.mark.parametrize("specularity", [0.0, 0.8, 1.0])
 def test_images_of_other_sizes_and_contacts_compile_nothing(specularity: float) -> None:
     design = ots.set_value(ots.load("gelsight-mini-ideal"), "coating.specularity", specularity)
     model = OpticalModel(design, "llvm")
@@ -36,5 +36,4 @@ def test_images_of_other_sizes_and_contacts_compile_nothing(specularity: float) 
 
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         compiled(), compiled()  # what is compiled once
-        for _ in range(3):
-            assert compiled() == []
+        assert compiled() == []
