@@ -17,12 +17,9 @@ PER_PIXEL = 0.01
 """RMS error of pixels, relative to that mean."""
 
 
-@pytest.mark.parametrize("specularity", [0.0, 0.5])
-def test_merged_beams_give_the_picture_of_all_bins(
-    specularity: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_merged_beams_give_the_picture_of_all_bins(monkeypatch: pytest.MonkeyPatch) -> None:
     """A coating that is part metal tells directions apart."""
-    design = set_value(build("gelsight-mini-ideal"), "coating.specularity", specularity)
+    design = set_value(build("gelsight-mini-ideal"), "coating.specularity", 0.5)
     model = OpticalModel(design, "llvm")
     size = {"resolution": (80, 60), "photons": 100_000}
     merged = model.render(**size)
