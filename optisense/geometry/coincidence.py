@@ -17,6 +17,7 @@ import shapely
 from numpy.typing import NDArray
 
 from optisense.array_types import FloatArray
+from optisense.geometry._box_pairs import PAIRS_AT_ONCE, overlapping_boxes
 from optisense.geometry._flat_polygons import (
     THINNEST,
     area_and_length,
@@ -27,7 +28,6 @@ from optisense.geometry._flat_polygons import (
     is_shape,
     lie_apart,
 )
-from optisense.geometry.box_pairs import PAIRS_AT_ONCE, overlapping_boxes
 from optisense.geometry.mesh import TriangleMesh
 
 PARALLEL = float(np.cos(np.radians(10.0)))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.array_types import FloatArray
-from optisense.geometry.box_pairs import BoxPairs, overlapping_boxes, overlapping_pairs
+from optisense.geometry._box_pairs import BoxPairs, overlapping_boxes, overlapping_pairs
 from optisense.geometry.mesh import TriangleMesh
 
 TOUCH = 1e-4

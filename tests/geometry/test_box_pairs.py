@@ -9,7 +9,7 @@ import pytest
 
 from optisense.array_types import FloatArray
 from optisense.geometry import TriangleMesh
-from optisense.geometry.box_pairs import (
+from optisense.geometry._box_pairs import (
     PAIRS_AT_ONCE,
     BoxPairs,
     overlapping_boxes,
