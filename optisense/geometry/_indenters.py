@@ -1,7 +1,8 @@
 """Indenters that press on a sensor: spheres, cylinders, plates and any mesh.
 
 Each indenter has a frame of its own: +z points away from the sensor, and its lowest point lies
-at z = 0. Shading normals are those of the exact shape and point out of the indenter.
+at z = 0; `Contact` states how x and y lie on the sensor. Shading normals are those of the exact
+shape and point out of the indenter.
 """
 
 from __future__ import annotations
@@ -92,7 +93,8 @@ class Cylinder(IndenterKind):
     Attributes:
         radius: radius, mm.
         length: length along its axis, mm.
-        angle: angle (degrees) from the u axis of the sensing surface to the cylinder's axis.
+        angle: angle (degrees) from the indenter's x axis to the cylinder's axis, counter-clockwise
+            seen from outside the sensor; see `Contact` for the frame.
     """
 
     kind: ClassVar[str] = "cylinder"
@@ -100,7 +102,7 @@ class Cylinder(IndenterKind):
 
     radius: float = quantity("mm", "The radius of the cylinder.", low=SMALLEST, high=LARGEST)
     length: float = quantity("mm", "The length along its axis.", 40.0, low=SMALLEST, high=LARGEST)
-    angle: float = quantity("degrees", "From the surface's u axis to the cylinder's axis.", 0.0)
+    angle: float = quantity("degrees", "From x to its axis, seen from outside.", 0.0)
 
     def mesh(self, reach: float, facet_error: float = FACET_ERROR) -> TriangleMesh:
         """Return the lower part of the side and of both ends; see `Indenter.mesh`."""
@@ -136,15 +138,17 @@ class Plane(IndenterKind):
     Its middle lies above the place of the contact; the depth is that of its lowest corner.
 
     Attributes:
-        tilt_x, tilt_y: rotation (degrees) about the u axis and then about the v axis.
+        tilt_x, tilt_y: right-handed rotation (degrees) about the indenter's x axis and then about
+            its y axis; see `Contact` for the frame. A positive `tilt_x` lowers the side of -y into
+            the gel, which is that of +v in a direct view; a positive `tilt_y` that of +x, or +u.
         size: side, mm.
     """
 
     kind: ClassVar[str] = "plane"
     convex: ClassVar[bool] = True
 
-    tilt_x: float = quantity("degrees", "The turn about the u axis.", 0.0, low=-89.9, high=89.9)
-    tilt_y: float = quantity("degrees", "The turn about the v axis.", 0.0, low=-89.9, high=89.9)
+    tilt_x: float = quantity("degrees", "The turn about the x axis.", 0.0, low=-89.9, high=89.9)
+    tilt_y: float = quantity("degrees", "The turn about the y axis.", 0.0, low=-89.9, high=89.9)
     size: float = quantity("mm", "The side of the plate.", 8.0, low=SMALLEST, high=LARGEST)
 
     def tilted(self, tilt_x: float, tilt_y: float) -> Plane:

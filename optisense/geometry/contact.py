@@ -49,6 +49,11 @@ PER_METRE = 1000.0
 class Contact:
     """An indenter pressed into the sensing surface along its inward normal.
 
+    The frame of an indenter is right-handed. Its z axis is the outward normal and its x axis is
+    parallel to u. Its y axis is opposite to v, because a camera sees the surface from inside, where
+    u, v and the inward normal are right-handed; it is along v only where a mirror turns the picture
+    over.
+
     Lists and arrays of numbers are converted into tuples.
 
     Attributes:
@@ -60,7 +65,8 @@ class Contact:
         depth: distance (mm) from the undeformed surface to the indenter's lowest point. With a
             `force`, it keeps its default; another value is an error.
         rotation: rotation (degrees) about the outward normal, counter-clockwise seen from outside;
-            at 0 the indenter's x axis is parallel to u.
+            at 0 the indenter's x axis is parallel to u, and above 0 it turns towards -v in a direct
+            view.
         along: (3,) direction in the design's frame whose projection on the surface replaces u as
             the direction of the x axis.
         force: force (N) along the inward normal, instead of `depth`, which then follows from the

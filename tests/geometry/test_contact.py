@@ -151,6 +151,14 @@ def test_rotation_turns_a_cylinder_counter_clockwise_seen_from_outside() -> None
     np.testing.assert_allclose(flat.bounds[:, 0], [-4, 6], atol=1e-9)
 
 
+def test_a_positive_tilt_lowers_the_side_of_v_or_of_u_in_a_direct_view() -> None:
+    seen = SensingSurface(FLAT.mesh, (0, 0, 0), (1, 0, 0), (0, -1, 0))  # u x v points inward
+    for plate, way in ((Plane(tilt_x=6.0), seen.v_axis), (Plane(tilt_y=6.0), seen.u_axis)):
+        mesh = place(Contact(plate, depth=0.4), seen, GEL)
+        lowest = mesh.vertices[mesh.vertices[:, 2] < mesh.bounds[0, 2] + 1e-9]
+        np.testing.assert_allclose(lowest @ way, 4.0 * math.cos(math.radians(6.0)))
+
+
 def test_an_indenter_lies_along_a_direction_of_the_frame() -> None:
     turned = place(Contact(Cylinder(1.0, 10.0), at=(1, 2), depth=0.4, rotation=70.0), FLAT, GEL)
     along = (math.cos(math.radians(50)), math.sin(math.radians(50)), 0.3)  # as the surface allows
