@@ -23,14 +23,22 @@ _BOX_SIDES = (  # (axis across the side, the two axes in it, which end of the ax
 """The six sides of a box: the axis across the side, the two axes in it, and the end of the axis at
 which it lies."""
 
+_ROWS = {
+    "vertices": "Give x, y and z of a vertex in each row",
+    "faces": "Give the numbers of three vertices in each row; split quads into triangles",
+    "normals": "Give x, y and z of a normal in each row",
+}
+"""The remedy for an array of a mesh that has not three numbers in each row."""
+
 
 @dataclass(frozen=True, eq=False)
 class TriangleMesh:
     """An indexed triangle mesh, open or closed, in mm.
 
     Faces wind counter-clockwise seen from the side their normal points to. Nothing is
-    checked on construction beyond the array shapes; see `validate`. A mesh never changes: its
-    arrays are read-only, and arrays that can be written to are copied when it is made.
+    checked on construction beyond the shapes of the arrays and that faces are whole numbers; see
+    `validate`. A mesh never changes: its arrays are read-only, and arrays that can be written to
+    are copied when it is made.
 
     Attributes:
         vertices: (n, 3) float64, mm.
@@ -38,6 +46,10 @@ class TriangleMesh:
         normals: (n, 3) float64 unit shading normals of the vertices, or None.
         rest: the same faces before they were deformed, whose creases remain sharp; None if they
             were not. It is not compared.
+
+    Raises:
+        MeshError: an array has another shape (one without elements may have any), or a face is not
+            of whole numbers.
     """
 
     vertices: FloatArray
@@ -46,15 +58,36 @@ class TriangleMesh:
     rest: TriangleMesh | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "vertices", _fixed_rows(self.vertices, np.float64))
-        object.__setattr__(self, "faces", _fixed_rows(self.faces, np.int32))
+        self._fix("vertices", np.float64)
+        self._fix("faces", np.int32)
         if self.normals is not None:
-            object.__setattr__(self, "normals", _fixed_rows(self.normals, np.float64))
+            self._fix("normals", np.float64)
             if len(self.normals) != len(self.vertices):
                 raise MeshError(
                     f"a mesh has {len(self.vertices)} vertices but {len(self.normals)} normals",
                     hint="Give one normal for each vertex, or none",
                 )
+
+    def _fix(self, name: str, dtype: type[np.generic]) -> None:
+        """Make a field a read-only array (n, 3), which is a copy unless it can't be written to;
+        raise MeshError if it has another shape or is not of whole numbers for a `dtype` of these.
+        """
+        try:
+            given = np.asarray(getattr(self, name))
+            with np.errstate(invalid="ignore"):
+                array = given.astype(dtype, copy=not _is_fixed(given))
+        except (TypeError, ValueError, OverflowError):  # rows of different lengths, or no numbers
+            problem = "are not rows of numbers"
+        else:
+            array.setflags(write=False)
+            if array.size and array.shape[1:] != (3,):
+                problem = f"have the shape {array.shape}, not (n, 3)"
+            elif dtype is np.int32 and not np.array_equal(array, given):
+                problem = "are not whole numbers"
+            else:
+                object.__setattr__(self, name, array.reshape(-1, 3))
+                return
+        raise MeshError(f"the {name} of a mesh {problem}", hint=_ROWS[name])
 
     def __deepcopy__(self, memo: object) -> TriangleMesh:
         return self
@@ -336,12 +369,11 @@ class TriangleMesh:
         return TriangleMesh(self.vertices[vertex], faces, normals)
 
 
-def _fixed_rows(values: ArrayLike, dtype: type[np.generic]) -> NDArray[Any]:
-    """Return a read-only array (n, 3) of the values, which is a copy unless they are read-only."""
-    fixed = isinstance(values, np.ndarray) and not values.flags.writeable
-    array = np.asarray(values, dtype=dtype) if fixed else np.array(values, dtype=dtype)
-    array.setflags(write=False)
-    return array.reshape(-1, 3)
+def _is_fixed(array: NDArray[Any]) -> bool:
+    """Return whether neither an array nor one that it is a view of can be written to."""
+    if array.flags.writeable:
+        return False
+    return array.base is None or (isinstance(array.base, np.ndarray) and _is_fixed(array.base))
 
 
 def _equal(one: NDArray[Any] | None, other: NDArray[Any] | None) -> bool:

@@ -2,7 +2,9 @@
 
 import copy
 import pickle
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -192,6 +194,33 @@ def test_not_a_number_and_empty_meshes_are_refused() -> None:
         mesh.with_vertices(vertices).validate("gel", closed=True)
     with pytest.raises(MeshError, match="no triangles"):
         TriangleMesh(mesh.vertices, np.zeros((0, 3))).validate("gel", closed=False)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"faces": np.zeros((6, 4), dtype=int)}, r"faces .* shape \(6, 4\).* split quads"),
+        ({"faces": [[0, 1, 2], [0, 1, 2, 3]]}, "faces .* not rows of numbers.* split quads"),
+        ({"faces": [[0, 1, 2.5]]}, "faces .* not whole numbers"),
+        ({"faces": [[0, 1, np.nan]]}, "faces .* not whole numbers"),
+        ({"faces": [[0, 1, 2**32 + 2]]}, "faces .* not whole numbers"),
+        ({"vertices": np.zeros((3, 8))}, r"vertices .* shape \(3, 8\)"),
+        ({"vertices": np.zeros(9)}, r"vertices .* shape \(9,\)"),
+        ({"normals": np.zeros((3, 2, 4))}, r"normals .* shape \(3, 2, 4\)"),
+    ],
+)
+def test_arrays_of_other_shapes_are_refused(change: dict[str, Any], told: str) -> None:
+    with pytest.raises(MeshError, match=told):
+        replace(box((1, 1, 1)), **change)
+
+
+def test_a_read_only_view_of_an_array_is_copied() -> None:
+    vertices = box((1, 1, 1)).vertices.copy()
+    view = vertices[:]
+    view.setflags(write=False)
+    mesh = TriangleMesh(view, box((1, 1, 1)).faces)
+    vertices[:] = 0.0
+    assert mesh.volume == pytest.approx(48)
 
 
 def test_crease_keeps_box_edges_sharp_and_a_fine_sphere_smooth() -> None:
