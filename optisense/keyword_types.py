@@ -5,9 +5,12 @@ from __future__ import annotations
 import inspect
 import math
 import numbers
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from types import NoneType, UnionType
 from typing import Any, Union, get_args, get_origin
+
+import numpy as np
 
 WORDS = {bool: "true or false", int: "a whole number", float: "a number", str: "a word"}
 """What a user is asked to give for an argument of each type."""
@@ -23,6 +26,27 @@ def is_real(value: Any) -> bool:
 def is_number(value: Any) -> bool:
     """Return whether a value is a finite number that JSON can hold, and not a truth value."""
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def plain_numbers(value: Any) -> Any:
+    """Return NumPy's numbers as those of Python and its arrays as tuples, also those in tuples,
+    lists and mappings, so that they can be written as JSON; other values as they are.
+    """
+    if isinstance(value, np.ndarray):
+        return plain_numbers(tuple(value)) if value.ndim else value.item()
+    if isinstance(value, np.generic):
+        return value.item()
+    if type(value) in (tuple, list):
+        return type(value)(map(plain_numbers, value))
+    if isinstance(value, Mapping):
+        return {key: plain_numbers(inner) for key, inner in value.items()}
+    return value
+
+
+def set_plain_numbers(instance: Any) -> None:
+    """Convert all fields of a frozen dataclass by `plain_numbers`."""
+    for each in fields(instance):
+        object.__setattr__(instance, each.name, plain_numbers(getattr(instance, each.name)))
 
 
 def types_of(argument: inspect.Parameter) -> tuple[Any, ...]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from optisense.design import SensorDesign
 from optisense.geometry import Contact, TriangleMesh
 from optisense.geometry.contact import refuse_no_contacts
+from optisense.keyword_types import plain_numbers
 from optisense.mechanics import ELASTIC, PressedSkin, SkinMesh
 from optisense.mechanics.skins import refuse_drags
 from optisense.optics._ray_model import RayModel
@@ -198,6 +199,7 @@ class OpticalModel(RayModel):
             RenderError: the camera sees nothing of the sensing surface, or a setting is invalid.
         """
         refuse_no_contacts(contacts)
+        noise, seconds, seed = plain_numbers((noise, seconds, seed))  # for `settings`
         check_choices(estimator, skin, noise, seconds, seed)
         refuse_drags(contacts, skin)
         check_pixels(resolution)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from optisense.errors import RenderError
 from optisense.keyword_types import is_real
 from optisense.mechanics import SKINS
@@ -27,7 +25,7 @@ def check_choices(estimator: str, skin: str, noise: Any, seconds: Any, seed: Any
             raise RenderError(
                 f"the limit '{name}' is {value!r}", hint="Give a number above 0, or none"
             )
-    if not (isinstance(seed, int | np.integer) and 0 <= seed <= MOST_SEED):
+    if not (isinstance(seed, int) and 0 <= seed <= MOST_SEED):
         raise RenderError(f"the seed is {seed!r}", hint=f"Give a number from 0 to {MOST_SEED}")
 
 

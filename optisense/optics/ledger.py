@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.errors import RenderError
+from optisense.keyword_types import plain_numbers
 from optisense.optics._skin_view import VIEW_ACROSS
 from optisense.optics.backend.arrays import indices
 from optisense.optics.scene.assembly import Assembly
@@ -153,7 +154,7 @@ class LightLedger:
         """Return the ledger as plain numbers and names, ready for JSON."""
         return {
             "units": {"power": "mW"},
-            "photons": self.photons,
+            "photons": plain_numbers(self.photons),
             "emitted": self.emitted,
             "entries": [vars(entry) for entry in self.entries],
             "exits": [vars(each) for each in self.exits],

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.geometry.mesh_points import surface_samples
+from optisense.keyword_types import plain_numbers
 from optisense.optics.ledger import cells_in_view, refuse_few_photons
 from optisense.optics.transport.light_ledger import BATCHES
 from optisense.optics.transport.photons import TargetCells
@@ -87,9 +88,9 @@ class PlaceLight:
         """Return the values as plain numbers and names, ready for JSON."""
         return {
             "units": {"irradiance": "mW/mm^2", "length": "mm", "angle": "degree"},
-            "at": list(self.at),
+            "at": plain_numbers(list(self.at)),
             "point": self.point.tolist(),
-            "photons": self.photons,
+            "photons": plain_numbers(self.photons),
             "groups": {
                 name: {
                     "irradiance": each.irradiance,

@@ -13,6 +13,7 @@ from optisense.errors import TaskError
 from optisense.geometry import Contact, Indenter
 from optisense.geometry.contact_text import INDENTER_FORM, parse_indenter
 from optisense.geometry.indenter_kinds import tilted
+from optisense.keyword_types import set_plain_numbers
 from optisense.tasks._splits import Cell, cell_of
 
 if TYPE_CHECKING:
@@ -132,6 +133,7 @@ class ContactDraw:
     margin: float = MARGIN
 
     def __post_init__(self) -> None:
+        set_plain_numbers(self)
         if not self.indenters:
             raise TaskError("no indenter is given", hint=INDENTER_FORM)
         for text in self.indenters:

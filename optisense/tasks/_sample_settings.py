@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from optisense.errors import TaskError
 from optisense.geometry import Contact
+from optisense.keyword_types import set_plain_numbers
 from optisense.mechanics import ELASTIC
 from optisense.optics.estimators import RADIANCE_CACHE
 from optisense.quality import MOST_SEED, SAMPLE_PHOTONS
@@ -37,6 +38,7 @@ class SampleRendering:
     skin: str = ELASTIC
 
     def __post_init__(self) -> None:
+        set_plain_numbers(self)
         if not 0 <= self.camera_noise < 256:
             raise TaskError(f"the camera noise is {self.camera_noise:g}", hint="Give 0 to 255")
         if not 0 <= self.seed <= MOST_SEED:

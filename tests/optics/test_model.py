@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import math
 from functools import cache, partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -313,6 +315,21 @@ def test_a_conforming_skin_refuses_to_be_dragged(motion: dict[str, Any]) -> None
         model().render([ball], PIXELS, PHOTONS, skin="conforming")
     with pytest.raises(ContactError, match="a shift or a twist"):
         reconstruct(model(), ReconstructionSettings(skin="conforming"), {"ball": ball})
+
+
+def test_settings_that_are_numbers_of_numpy_are_saved(tmp_path: Path) -> None:
+    limits: Any = {"noise": np.float32(1e-3), "seconds": np.float64(60), "seed": np.int64(3)}
+    image = model().render((), np.array(FEW_PIXELS), np.int64(FEW_PHOTONS), **limits)  # type: ignore[arg-type]
+    image.save(tmp_path)
+    told = json.loads((tmp_path / "run.json").read_text())
+    asked = ("noise_asked_percent", "seconds_asked", "seed", "photons_asked", "resolution")
+    assert [told[name] for name in asked] == [
+        float(np.float32(1e-3)),
+        60.0,
+        3,
+        FEW_PHOTONS,
+        [*FEW_PIXELS],
+    ]
 
 
 def test_run_settings_tell_the_force() -> None:

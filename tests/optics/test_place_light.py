@@ -99,7 +99,10 @@ def test_what_can_t_be_is_refused_and_dark_groups_are_left_out() -> None:
     design = ots.load("gelsight-mini-ideal")
     design.lights["red"].flux = 0.0
     model = OpticalModel(design)
-    assert list(light_at(model, (0.0, 0.0), 20_000).groups) == ["green", "blue"]
+    found = light_at(model, np.zeros(2), np.int64(20_000))  # type: ignore[arg-type]
+    told = json.loads(json.dumps(found.as_data(), allow_nan=False))
+    assert list(told["groups"]) == ["green", "blue"]
+    assert (told["at"], told["photons"]) == ([0.0, 0.0], 20_000)
     with pytest.raises(ContactError, match="off the sensing surface"):
         light_at(model, (50.0, 0.0), 20_000)
     with pytest.raises(RenderError, match="too few"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 from types import ModuleType
@@ -14,11 +15,22 @@ from optisense.design import SensorDesign, save_design, set_value
 from optisense.errors import SearchError
 from optisense.objectives.registry import forgetting
 from optisense.quality import TRIAL_PHOTONS
-from optisense.search import Outcome, Plan, SearchProgress, SearchSpace, Study, search
+from optisense.search import (
+    Around,
+    Continuous,
+    Integer,
+    Outcome,
+    Plan,
+    SearchProgress,
+    SearchSpace,
+    Study,
+    search,
+)
 from optisense.search._run_search import run_study
 from optisense.search.methods import METHODS, Method, register
 from optisense.search.methods._pareto import Pareto
 from optisense.search.space.constraints import UserRule
+from optisense.search.space.manufacturing import ManufacturingErrors
 from optisense.search.study.failures import incomplete
 
 SPACE = {"coating.specularity": (0.0, 1.0, 5), "camera.position.x": (-1.0, 3.0, 3)}
@@ -36,6 +48,28 @@ def test_finds_the_best_and_makes_its_design(mini: SensorDesign, goals: ModuleTy
     assert result.ended == "the budget is spent"
     assert len(result.trials) == 201
     assert mini.coating.specularity == 0.0
+
+
+def test_numbers_of_numpy_are_stored_in_a_study(mini: SensorDesign) -> None:
+    space = {
+        "coating.specularity": list(np.linspace(0.0, 1.0, 3)),
+        "camera.position.x": Continuous(np.float32(-1.0), np.float64(3.0), np.int64(3)),  # type: ignore[arg-type]
+        "camera.position.y": Around(np.float32(0.5)),  # type: ignore[arg-type]
+        "camera.resolution[0]": Integer(np.int64(100), np.int32(104)),  # type: ignore[arg-type]
+    }
+    asked: dict[str, Any] = {
+        "budget": np.int64(5),
+        "seed": np.uint8(2),
+        "options": {"sigma": np.float32(0.25)},
+        "settings": {"ray_resolution": np.array([40, 30]), "least_skin": np.float32(0.25)},
+        "errors": ManufacturingErrors({"camera.fov": np.float32(0.125)}),
+        "samples": np.int64(1),
+    }
+    settings = Plan(SearchSpace(space), ["coverage"], **asked).settings_for(mini)
+    told = json.loads(settings.to_text())
+    assert (told["budget"], told["seed"], told["samples"]) == (5, 2, 1)
+    assert told["settings"] == {"ray_resolution": [40, 30], "least_skin": 0.25}
+    assert told["space"]["camera.position.x"]["high"] == 3.0
 
 
 def test_no_point_is_scored_twice(mini: SensorDesign) -> None:

@@ -168,6 +168,14 @@ def test_the_interval_of_p10_reaches_to_failed_sensors() -> None:
     assert middle.low < middle.value < middle.high
 
 
+def test_results_for_a_seed_and_an_error_of_numpy_are_json(grey: SensorDesign) -> None:
+    found = tolerance(
+        grey, linear, {RED: np.float32(SIGMA)}, sensors=np.int64(16), seed=np.int64(7)
+    )  # type: ignore[arg-type]
+    again = json.loads(json.dumps(found.to_dict(), allow_nan=False))
+    assert (again["seed"], again["errors"]) == (7, {RED: ["normal", float(np.float32(SIGMA))]})
+
+
 def test_results_are_json_and_each_score_has_the_values_that_gave_it(result: Tolerance) -> None:
     again = json.loads(json.dumps(result.to_dict(), allow_nan=False))
     assert again["sensors"] == result.sensors == 2400

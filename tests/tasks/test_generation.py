@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,15 @@ SETTINGS = DatasetSettings(
     camera_noise=1.5,
     radiance=True,
 )
+
+
+def test_settings_of_numpy_are_those_of_python() -> None:
+    given: Any = {"resolution": np.array([60, 45]), "photons": np.int64(20_000)}
+    given |= {"seed": np.int64(3), "camera_noise": np.float64(1.5)}
+    draw = ContactDraw(SETTINGS.contacts.indenters, depth=np.array([0.3, 0.9]))  # type: ignore[arg-type]
+    settings = DatasetSettings(draw, radiance=True, **given)
+    assert settings == SETTINGS
+    assert json.dumps(asdict(settings)) == json.dumps(asdict(SETTINGS))
 
 
 @pytest.fixture(scope="module")

@@ -12,6 +12,7 @@ import numpy as np
 from optisense.array_types import FloatArray
 from optisense.design import SensorDesign, set_value
 from optisense.errors import DesignError, SearchError
+from optisense.keyword_types import set_plain_numbers
 from optisense.near import suggestion
 from optisense.search.space._expansion import expand
 from optisense.search.space.parameters import Around, CagePoints, Continuous, Parameter
@@ -46,6 +47,7 @@ class ToleranceDistribution:
     kind: Literal["normal", "uniform"] = "normal"
 
     def __post_init__(self) -> None:
+        set_plain_numbers(self)
         if not (np.isfinite(self.size) and self.size > 0.0):
             raise SearchError(f"an error of {self.size} is not a number above 0")
         if self.kind not in ("normal", "uniform"):

@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from optisense.errors import SearchError
+from optisense.keyword_types import plain_numbers, set_plain_numbers
 from optisense.search.space.design_variables import DesignVariable
 
 MOST_STEPS = 1_000_000
@@ -28,6 +29,7 @@ class Continuous:
     steps: int | None = None
 
     def __post_init__(self) -> None:
+        set_plain_numbers(self)
         check_bounds(self.low, self.high)
         if self.steps is not None:
             if isinstance(self.steps, bool) or not isinstance(self.steps, int) or self.steps < 2:
@@ -59,6 +61,7 @@ class Integer:
     high: int
 
     def __post_init__(self) -> None:
+        set_plain_numbers(self)
         for bound in (self.low, self.high):
             if isinstance(bound, bool) or not isinstance(bound, int):
                 raise SearchError(f"the bound {bound!r} of an integer is not a whole number")
@@ -84,7 +87,7 @@ class Choice:
     labels: tuple[str, ...] = ()
 
     def __init__(self, options: Iterable[Any], labels: Iterable[str] = ()) -> None:
-        frozen = tuple(tuple(o) if isinstance(o, list) else o for o in options)
+        frozen = tuple(tuple(o) if isinstance(o, list) else o for o in map(plain_numbers, options))
         names = tuple(labels) or tuple(_label(option) for option in frozen)
         object.__setattr__(self, "options", frozen)
         object.__setattr__(self, "labels", names)
@@ -128,6 +131,7 @@ class Around:
     steps: int | None = None
 
     def __post_init__(self) -> None:
+        set_plain_numbers(self)
         if not (math.isfinite(self.reach) and self.reach > 0.0):
             raise SearchError(f"the reach is {self.reach}, which is not a number above 0")
 
@@ -172,7 +176,7 @@ class CagePoints:
         if symmetry is not None and symmetry not in ("x", "y", "z"):
             raise SearchError(f"there is no symmetry '{symmetry}'", hint="Give x, y or z")
         object.__setattr__(self, "range", spec)
-        object.__setattr__(self, "points", None if points is None else tuple(points))
+        object.__setattr__(self, "points", None if points is None else plain_numbers(tuple(points)))
         object.__setattr__(self, "axes", axes)
         object.__setattr__(self, "symmetry", symmetry)
 

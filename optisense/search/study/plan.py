@@ -11,6 +11,7 @@ from typing import Any
 from optisense.design import SensorDesign
 from optisense.design.difference import fingerprint
 from optisense.errors import SearchError
+from optisense.keyword_types import set_plain_numbers
 from optisense.objectives import Objective
 from optisense.objectives.combined import goal_of
 from optisense.quality import TRIAL_PHOTONS
@@ -55,6 +56,9 @@ class Plan:
     samples: int | None = None
     requirements: Sequence[str] = ()
     coarse_first: bool = False
+
+    def __post_init__(self) -> None:
+        set_plain_numbers(self)
 
     def settings_for(self, design: SensorDesign) -> StudySettings:
         """Return the settings of the study for a design, with all defaults resolved; an error if a

@@ -15,6 +15,7 @@ from optisense.array_types import FloatArray
 from optisense.design import SensorDesign
 from optisense.errors import SearchError
 from optisense.json_values import json_ready
+from optisense.keyword_types import plain_numbers
 from optisense.objectives.score import deviation_of
 from optisense.search.evaluation.evaluator import DesignEvaluator, Goal, as_goals
 from optisense.search.evaluation.outcome import Outcome
@@ -143,7 +144,7 @@ class Tolerance:
 
     def to_dict(self) -> dict[str, Any]:
         """Return all results but the numbers with errors, ready for JSON."""
-        return {
+        values = {
             "design": self.design.name,
             "versions": package_versions(),
             "seed": self.seed,
@@ -155,6 +156,7 @@ class Tolerance:
             "failures": dict(self.failures),
             "objectives": {name: _plain(each) for name, each in self.results.items()},
         }
+        return plain_numbers(values)
 
 
 def usual_errors(design: SensorDesign) -> ManufacturingErrors:
