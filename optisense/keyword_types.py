@@ -61,7 +61,8 @@ def types_of(argument: inspect.Parameter) -> tuple[Any, ...]:
 
 
 def as_type(value: Any, types: Sequence[Any]) -> Any:
-    """Return a value for an argument of some types; 4.0 as 4 if it has to be a whole number.
+    """Return a value for an argument of some types; 4.0 as 4 if it has to be a whole number, and a
+    number of NumPy as one of Python.
 
     A value is returned as it is if one of the types is neither of `WORDS` nor None's.
 
@@ -71,6 +72,7 @@ def as_type(value: Any, types: Sequence[Any]) -> Any:
     known = (*WORDS, NoneType)
     if not types or not all(kind in known for kind in types):
         return value
+    value = plain_numbers(value)
     if value is None or isinstance(value, bool | str):
         if type(value) in types:
             return value

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from optisense.design.camera_checks import LEAST_PICTURE, LEAST_SKIN
 from optisense.errors import ObjectiveError
-from optisense.keyword_types import is_number
+from optisense.keyword_types import is_number, set_plain_numbers
 from optisense.mechanics.skins import CONFORMING, SKINS
 from optisense.quality import LEVELS, MOST_PHOTONS, photons_of
 
@@ -75,6 +75,7 @@ class Settings:
     skin: str = CONFORMING
 
     def __post_init__(self) -> None:
+        set_plain_numbers(self)
         for name in ("resolution", "ray_resolution"):
             size = getattr(self, name)
             if size is not None:

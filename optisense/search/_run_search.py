@@ -110,7 +110,7 @@ def search(
     return run_study(
         study,
         workers=workers,
-        limit=budget if resume else None,
+        limit=plan.budget if resume else None,
         variant=variant,
         progress=progress,
     )

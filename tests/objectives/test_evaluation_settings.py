@@ -1,13 +1,15 @@
-"""Settings of evaluations and objectives that are refused."""
+"""Settings of evaluations and objectives: which are taken, and which are refused."""
 
 from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 from optisense import OpticalModel, evaluate
 from optisense.errors import ObjectiveError
+from optisense.objectives import Settings
 
 
 @pytest.mark.parametrize(
@@ -40,6 +42,25 @@ def test_settings_that_make_no_sense_are_refused(
 ) -> None:
     with pytest.raises(ObjectiveError):
         evaluate(model, ["rgb2normal", "normdiff"], **settings)
+
+
+def test_settings_may_be_numbers_and_arrays_of_numpy(model: OpticalModel) -> None:
+    given: dict[str, Any] = {
+        "resolution": np.array([40, 30]),
+        "ray_resolution": (np.int64(40), np.int64(30)),
+        "photons": np.int64(1000),
+        "seed": np.int64(1),
+        "depth": np.float32(0.25),
+        "places": np.array([[0.0, 0.0], [2.0, 1.0]]),
+        "exposure": np.float32(2.0),
+    }
+    assert Settings(**given) == Settings(
+        (40, 30), (40, 30), 1000, 1, depth=0.25, places=((0, 0), (2, 1)), exposure=2.0
+    )
+    weight = {"coverage_weight": np.float32(0.5)}  # a setting of the objective itself
+    found = evaluate(model, "aoap", ray_resolution=given["resolution"], **weight)  # type: ignore[arg-type]
+    same = evaluate(model, "aoap", ray_resolution=(40, 30), coverage_weight=0.5)
+    assert found.value == same.value
 
 
 @pytest.mark.parametrize(

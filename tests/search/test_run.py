@@ -72,6 +72,14 @@ def test_numbers_of_numpy_are_stored_in_a_study(mini: SensorDesign) -> None:
     assert told["space"]["camera.position.x"]["high"] == 3.0
 
 
+def test_the_numbers_of_a_plan_are_whole(mini: SensorDesign) -> None:
+    assert Plan(SearchSpace(SPACE), ["coverage"], budget=3.0).settings_for(mini).budget == 3  # type: ignore[arg-type]
+    for name, value in (("budget", 2.5), ("budget", math.nan), ("seed", 0.5), ("samples", "2")):
+        given: dict[str, Any] = {name: value}
+        with pytest.raises(SearchError, match=f"the {name} is {value!r}.* whole number"):
+            Plan(SearchSpace(SPACE), ["coverage"], **given)
+
+
 def test_no_point_is_scored_twice(mini: SensorDesign) -> None:
     """A grid holds the start; whole numbers and options repeat."""
     asked: list[float] = []

@@ -335,6 +335,19 @@ class TestBadInput:
         assert near in str(told.value.hint)
 
     @pytest.mark.parametrize(
+        "bounds",
+        [
+            (np.float32(0.0), np.int64(1)),
+            np.array([0.0, 1.0]),
+            np.array([0, 1]),
+        ],
+        ids=repr,
+    )
+    def test_bounds_may_be_of_numpy(self, bounds: object) -> None:
+        space = SearchSpace({"coating.specularity": bounds})
+        assert space.parameters == {"coating.specularity": Continuous(0.0, 1.0)}
+
+    @pytest.mark.parametrize(
         ("bounds", "said"),
         [
             ((1.0, 0.0), "reversed.* Give 0 first and 1 second"),

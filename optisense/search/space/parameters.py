@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from optisense.errors import SearchError
-from optisense.keyword_types import plain_numbers, set_plain_numbers
+from optisense.keyword_types import is_real, plain_numbers, set_plain_numbers
 from optisense.search.space.design_variables import DesignVariable
 
 MOST_STEPS = 1_000_000
@@ -208,17 +208,19 @@ Specification = Single | Around | CagePoints | Together
 
 
 def as_specification(value: object) -> Specification:
-    """Parse the short forms: (low, high), (low, high, steps), or a list of options.
+    """Parse the short forms: (low, high), (low, high, steps), also as an array, or a list of
+    options.
 
     Raises:
         SearchError: the value has another form, or its bounds are empty, reversed or not finite.
     """
     if isinstance(value, Continuous | Integer | Choice | Around | CagePoints | Together):
         return value
-    if isinstance(value, tuple) and len(value) in (2, 3) and all(map(_is_number, value)):
-        return Continuous(float(value[0]), float(value[1]), *value[2:])
-    if isinstance(value, list):
-        return Choice(value)
+    plain = plain_numbers(value)
+    if isinstance(plain, tuple) and len(plain) in (2, 3) and all(map(is_real, plain)):
+        return Continuous(float(plain[0]), float(plain[1]), *plain[2:])
+    if isinstance(plain, list):
+        return Choice(plain)
     raise SearchError(
         f"{value!r} is not a specification of a parameter",
         hint="Give (low, high), Integer(low, high), Choice([...]), Around(reach), CagePoints or "
@@ -275,10 +277,6 @@ def from_plain(data: Mapping[str, Any]) -> Specification:
         return kind(**given)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise SearchError(f"a parameter can't be read: {error}", where=str(data)[:80]) from None
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _label(option: object) -> str:

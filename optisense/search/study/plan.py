@@ -6,12 +6,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import NoneType
 from typing import Any
 
 from optisense.design import SensorDesign
 from optisense.design.difference import fingerprint
 from optisense.errors import SearchError
-from optisense.keyword_types import set_plain_numbers
+from optisense.keyword_types import as_type, set_plain_numbers
 from optisense.objectives import Objective
 from optisense.objectives.combined import goal_of
 from optisense.quality import TRIAL_PHOTONS
@@ -59,6 +60,16 @@ class Plan:
 
     def __post_init__(self) -> None:
         set_plain_numbers(self)
+        for name, types in (
+            ("budget", (int, NoneType)),
+            ("seed", (int,)),
+            ("samples", (int, NoneType)),
+        ):
+            given = getattr(self, name)
+            try:
+                object.__setattr__(self, name, as_type(given, types))
+            except ValueError as wanted:
+                raise SearchError(f"the {name} is {given!r}", hint=f"Give {wanted}") from None
 
     def settings_for(self, design: SensorDesign) -> StudySettings:
         """Return the settings of the study for a design, with all defaults resolved; an error if a
