@@ -34,7 +34,7 @@ DARK = 1.5 / 255
 """Value of the brightest channel up to which a pixel is black."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Press:
     """A ball pressed in at one place. Row 0 of images is the top.
 

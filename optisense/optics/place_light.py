@@ -68,7 +68,7 @@ class GroupLight:
     main_azimuth: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PlaceLight:
     """The light at a place.
 

@@ -20,7 +20,7 @@ UNMOVED = 1e-4
 precision and the error of the tangent plane on a curved surface."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class UntouchedSurface:
     """The camera's view of an untouched sensor, in the design's frame.
 

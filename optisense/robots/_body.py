@@ -44,7 +44,7 @@ RESERVED = "world"
 """Name that the body without motion has in simulators, and no other one can have."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Frame:
     """Pose in the frame of the sensor.
 
@@ -76,7 +76,7 @@ class BodyMesh:
     is_gel: bool
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Skin:
     """Sensing surface.
 
@@ -94,7 +94,7 @@ class Skin:
     box: tuple[FloatArray, FloatArray]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SensorBody:
     """Sensor as a rigid body, in the frame of the design but in metres.
 

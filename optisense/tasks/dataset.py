@@ -46,7 +46,7 @@ CAMERA_ARRAYS: ArrayKinds = {"points": ("f", 3), "directions": ("f", 3)}
 """Kinds and channels of the arrays of `CAMERA`."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Sample:
     """One labelled contact; row 0 of arrays is the top of the image.
 

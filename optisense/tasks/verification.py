@@ -108,7 +108,7 @@ class SensorView:
     stretching: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Verification:
     """Errors of two sensors that read the same objects.
 

@@ -28,6 +28,12 @@ def files(folder: Path) -> set[str]:
     return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
 
 
+def test_an_image_is_found_among_others() -> None:
+    images = [image("red"), image("red")]
+    assert images.index(images[1]) == 1
+    assert len({*images}) == 2
+
+
 def test_files_are_written_on_one_processor_too(tmp_path: Path) -> None:
     """Mitsuba waits for other threads of Dr.Jit; on one processor there are none."""
     before = dr.thread_count()

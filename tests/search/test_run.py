@@ -47,6 +47,8 @@ def test_finds_the_best_and_makes_its_design(mini: SensorDesign, goals: ModuleTy
     assert result.start.score == goals.nearness(mini)
     assert result.ended == "the budget is spent"
     assert len(result.trials) == 201
+    assert result.trials.index(result.best) == result.best.number
+    assert result.start in {*result.trials} and result.start != result.best
     assert mini.coating.specularity == 0.0
 
 

@@ -44,7 +44,7 @@ SYMMETRIC = 1e-9
 its axis: rounding only."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Intensity:
     """Radiant intensity over the polar angle from the axis and the azimuth.
 

@@ -74,7 +74,7 @@ MARKER_COLUMNS = "u,v,column_before,row_before,column_after,row_after,dx,dy,dz"
 """Columns of `MARKERS_FILE`: mm on the undeformed surface, pixels from the upper left, mm."""
 
 
-@dataclass
+@dataclass(eq=False)
 class TactileImage:
     """The result of a render; row 0 of arrays is the top of the image.
 

@@ -39,7 +39,7 @@ class RayOutcome(IntEnum):
     DEPTH_LIMIT = 4  # still on its way after `interact.MAX_DEPTH` surfaces
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ChiefRays:
     """The chief rays of a picture, one per pixel; entries other than ``outcome`` and ``lamp`` are
     valid where ``outcome`` is HIT.

@@ -21,6 +21,8 @@ from optisense.search.space.search_space import BoundSpace
 class Trial:
     """A finished trial.
 
+    Trials are equal if they are the same trial of a study, whatever is known of its outcome.
+
     Attributes:
         number: number of the trial, from 0, the start.
         generation: generation that it was proposed in; -1 for the start.
@@ -34,12 +36,12 @@ class Trial:
 
     number: int
     generation: int
-    vector: NDArray[np.float64]
-    outcome: Outcome
+    vector: NDArray[np.float64] = field(compare=False)
+    outcome: Outcome = field(compare=False)
     space: BoundSpace = field(repr=False)
     objective: str = ""
-    fresh: Mapping[int, Outcome] = field(default_factory=dict, repr=False)
-    is_newer: bool = False
+    fresh: Mapping[int, Outcome] = field(default_factory=dict, repr=False, compare=False)
+    is_newer: bool = field(default=False, compare=False)
 
     @property
     def is_start(self) -> bool:

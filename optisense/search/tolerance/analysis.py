@@ -111,7 +111,7 @@ class ScoreDistribution:
         return ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Tolerance:
     """Effect of manufacturing errors on a design.
 
