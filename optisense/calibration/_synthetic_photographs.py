@@ -59,7 +59,7 @@ def photograph_model(
         raise CalibrationError(
             "only contacts of balls can be photographed for a calibration", hint="Press a Sphere"
         )
-    blank = model.render(resolution=resolution, photons=photons, seed=seed, partial=False)
+    blank = model.render(resolution=resolution, photons=photons, seed=seed)
     factor = blank.auto_exposure() if exposure is None else exposure
     rng = np.random.default_rng([seed, 17])
 
@@ -69,9 +69,7 @@ def photograph_model(
 
     presses = []
     for number, (contact, ball) in enumerate(zip(contacts, balls, strict=True), start=1):
-        image = model.render(
-            [contact], resolution=resolution, photons=photons, seed=seed, partial=False
-        )
+        image = model.render([contact], resolution=resolution, photons=photons, seed=seed)
         picture = noisy(image.picture(factor))
         presses.append(PhotographedPress(f"press-{number:02}.png", picture, 2.0 * ball.radius))
     return Photographs(noisy(blank.picture(factor)), tuple(presses))

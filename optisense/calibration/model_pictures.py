@@ -145,9 +145,7 @@ def _rendered(
     photons: int,
     seed: int,
 ) -> dict[str, Radiance]:
-    image = model.render(
-        pressed, resolution=size, photons=photons, seed=seed, partial=False, skin=ELASTIC
-    )
+    image = model.render(pressed, resolution=size, photons=photons, seed=seed, skin=ELASTIC)
     return {name: np.asarray(layer, dtype=np.float32) for name, layer in image.layers.items()}
 
 

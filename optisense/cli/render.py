@@ -106,6 +106,7 @@ def render(
             seed=options.seed,
             skin=options.skin,
             progress=report_progress,
+            partial=True,
         )
         line.begin("writing the report")
         image.settings["contacts"] = list(contact or [])

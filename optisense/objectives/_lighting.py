@@ -123,7 +123,6 @@ def _image(evaluation: Evaluation, contacts: Sequence[Contact]) -> TactileImage:
         resolution=evaluation.design.camera.size_at(ACROSS),
         photons=SCORE_PHOTONS if settings.photons is None else settings.photons,
         seed=settings.seed,
-        partial=False,
         skin=settings.skin,
     )
 

@@ -403,7 +403,6 @@ class Evaluation:
             progress=report,
             only_contacts=bool(contacts),
             pixel_importance=pixel_importance,
-            partial=False,  # no score is computed from a part of the light
             skin=self.settings.skin,
         )
         return image

@@ -161,7 +161,7 @@ class OpticalModel(RayModel):
         estimator: str = RADIANCE_CACHE,
         only_contacts: bool = False,
         pixel_importance: PixelImportance | None = None,
-        partial: bool = True,
+        partial: bool = False,
         skin: str = ELASTIC,
     ) -> TactileImage:
         """Render the camera's image while ``contacts`` press into the skin.
@@ -184,14 +184,14 @@ class OpticalModel(RayModel):
             pixel_importance: function of the chief rays that gives, with ``only_contacts``, the
                 share (h, w), 0 to 1, of the camera samples of each pixel; each pixel gets at least
                 a few.
-            partial: whether Ctrl-C after the first photons returns an image of the photons so far;
-                otherwise KeyboardInterrupt is raised at once.
+            partial: whether Ctrl-C after the first photons returns an image of the photons so far
+                instead of raising KeyboardInterrupt.
             skin: "elastic" for a skin that deforms like a gel, also around contacts; "conforming"
                 for a skin that takes the shape of the indenters where they overlap and stays flat
                 around them, as in the objectives of the OptiSense paper.
 
         Returns:
-            The image; ``interrupted`` is set if Ctrl-C ended the tracing early.
+            The image; ``interrupted`` is set if `partial` and Ctrl-C ended the tracing early.
 
         Raises:
             ContactError: a contact is off the surface or deeper than the gel, or has a shift or a

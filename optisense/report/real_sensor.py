@@ -127,8 +127,6 @@ def compare_with_real(
     image = model.render(
         [contact], resolution=(width, height), photons=photons, seed=seed, progress=progress
     )
-    if image.interrupted:
-        raise KeyboardInterrupt
     if not np.median(image.radiance) > 0.0:  # too few photons for a picture
         return None
     chain = image.chain.without_noise()

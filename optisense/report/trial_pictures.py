@@ -71,7 +71,7 @@ def nine_balls(
     contacts = model.nine_contacts(Sphere(settings.radius), settings.depth)
     size = model.design.camera.size_at(across)
     skin = settings.skin
-    image = model.render(contacts, resolution=size, photons=photons, skin=skin, partial=False)
+    image = model.render(contacts, resolution=size, photons=photons, skin=skin)
     return image, contacts
 
 

@@ -53,7 +53,7 @@ class SampleRendering:
         estimator: str = RADIANCE_CACHE,
         only_contacts: bool = False,
     ) -> TactileImage:
-        """Return the image of contacts; an interrupted rendering is no image.
+        """Return the image of contacts.
 
         Args:
             resolution: (width, height) pixels.
@@ -67,7 +67,6 @@ class SampleRendering:
             estimator=estimator,
             skin=self.skin,
             only_contacts=only_contacts,
-            partial=False,
         )
 
 

@@ -401,9 +401,9 @@ def test_ctrl_c_after_the_first_photons_ends_in_an_image_if_one_is_wanted() -> N
         if progress.stage is Stage.PHOTONS and progress.photons:
             raise KeyboardInterrupt
 
-    def stopped(partial: bool) -> TactileImage:
-        return fresh.render(resolution=(40, 30), photons=4_000_000, progress=press, partial=partial)
+    def stopped(**options: Any) -> TactileImage:
+        return fresh.render(resolution=(40, 30), photons=4_000_000, progress=press, **options)
 
     with pytest.raises(KeyboardInterrupt):
-        stopped(partial=False)
+        stopped()
     assert stopped(partial=True).interrupted

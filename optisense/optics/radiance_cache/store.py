@@ -297,7 +297,7 @@ class CacheStore:
         return np.asarray(nearest - half[which])
 
     def radiance_cache(
-        self, seed: int, limits: TracingLimits, on_stage: StageCallback, partial: bool = True
+        self, seed: int, limits: TracingLimits, on_stage: StageCallback, partial: bool = False
     ) -> tuple[RadianceCache, bool]:
         """Return the cache once a limit is reached.
 
