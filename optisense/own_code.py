@@ -7,6 +7,8 @@ from __future__ import annotations
 import re
 import sys
 import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.metadata import distributions
 from pathlib import Path
 from types import FrameType
@@ -18,6 +20,9 @@ HOME = Path(__file__).parent
 
 GROUPS = "optisense."
 """Start of the names of the groups of entry points by which packages add to this one."""
+
+REPAIR = "Repair this file or the package that contains it"
+"""Remedy for errors in code of users."""
 
 INSTALLED = frozenset({"site-packages", "dist-packages"})
 """Names of the folders of installed packages."""
@@ -74,8 +79,34 @@ def error_of_own_code(error: BaseException) -> OwnCodeError | None:
     return OwnCodeError(
         f"{type(error).__name__}: {error}",
         where=own[-1],
-        hint="Repair this file or the package that contains it",
+        hint=REPAIR,
     )
+
+
+@contextmanager
+def failures_named(what: str, where: str) -> Iterator[None]:
+    """Context for a call of a user's code, in which an error names what failed.
+
+    Errors that have a message for the user anyhow are left as they are; see `as_user_error`.
+
+    Args:
+        what: what is called, with its name.
+        where: its place, for errors that are raised before its first line.
+
+    Raises:
+        OwnCodeError: there was an error of another kind.
+    """
+    try:
+        yield
+    except (OptiSenseError, MemoryError, OSError):
+        raise
+    except Exception as error:
+        own = error_of_own_code(error)
+        raise OwnCodeError(
+            f"{what} fails: {type(error).__name__}: {error}",
+            where=where if own is None else own.where,
+            hint=REPAIR,
+        ) from error
 
 
 def _is_own(frame: FrameType, adding: set[str]) -> bool:

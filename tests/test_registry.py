@@ -258,7 +258,7 @@ def test_a_failure_in_a_package_is_not_called_a_defect_of_this_one(
     )
     assert done.returncode == 1
     line = MODULE[: MODULE.index("my mesh bug")].count("\n") + 1
-    assert "error: ValueError: my mesh bug" in done.stderr
+    assert "error: mesh() of the indenter 'dent' fails: ValueError: my mesh bug" in done.stderr
     assert f"where: {site / 'my_parts.py'}:{line}\n" in done.stderr
     assert "Repair this file or the package that contains it" in done.stderr
     assert "defect" not in done.stderr

@@ -21,7 +21,7 @@ from rich.segment import Segment
 
 from optisense import starting
 from optisense.cli.from_options import with_options
-from optisense.errors import OutputError, SetupError
+from optisense.errors import OutputError, OwnCodeError, SetupError
 from optisense.own_code import as_user_error
 from optisense.text import visible
 
@@ -151,9 +151,10 @@ def handles_errors(command: Callable[_P, _R]) -> Callable[..., _R]:
                 see="`optisense --debug ...`",
             )
             print_error(told.message, where=told.where, hint=told.hint)
-            if told is not error:
+            is_own = isinstance(told, OwnCodeError)
+            if told is not error or is_own:
                 _show_traceback()
-            failure = told is not error or isinstance(told, (OutputError, SetupError))
+            failure = told is not error or is_own or isinstance(told, (OutputError, SetupError))
             raise typer.Exit(EXIT_FAILURE if failure else EXIT_BAD_INPUT) from None
 
     return with_options(run)

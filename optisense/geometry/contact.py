@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from optisense.errors import ContactError
 from optisense.geometry._indenters import MeshIndenter
-from optisense.geometry.indenter_kinds import FACET_ERROR, Indenter, Tilted
+from optisense.geometry.indenter_kinds import FACET_ERROR, Indenter, Tilted, mesh_of
 from optisense.geometry.mesh import TriangleMesh
 from optisense.geometry.rays import exits
 from optisense.geometry.surface import SensingSurface, SurfacePoint
@@ -199,6 +199,7 @@ def place(
 
     Raises:
         ContactError: the contact is off the surface or as deep as the gel.
+        OwnCodeError: the class of the indenter fails; see `mesh_of`.
     """
     spot = locate(contact, surface)
     if gel:
@@ -214,7 +215,7 @@ def place(
     pose = np.eye(4)
     pose[:3, :3] = _axes(spot.inward, surface, contact)
     pose[:3, 3] = spot.point + contact.depth * spot.inward
-    return contact.indenter.mesh(reach, facet_error).transformed(pose)
+    return mesh_of(contact.indenter, reach, facet_error).transformed(pose)
 
 
 def available_depth(
@@ -277,7 +278,7 @@ def size_warning(contact: Contact) -> str | None:
         MeshError, ContactError: the mesh of the indenter can't be read.
     """
     reach = contact.depth
-    mesh = contact.indenter.mesh(reach, COARSE)
+    mesh = mesh_of(contact.indenter, reach, COARSE)
     size = float(np.ptp(mesh.bounds, axis=0).max())
     if contact.force is None and size < reach:
         said = f"an indenter {size:.2g} mm large is pressed {reach:g} mm deep"

@@ -18,13 +18,17 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from optisense.errors import ContactError
+from optisense.errors import ContactError, MeshError, OwnCodeError
 from optisense.geometry.mesh import TriangleMesh
 from optisense.geometry.rotations import turn_about_axes
 from optisense.keyword_types import is_real
 from optisense.near import suggestion
+from optisense.own_code import REPAIR, failures_named
 from optisense.registry import Registry, must_derive, place_of_definition
 from optisense.text import brief
+
+OWN_PACKAGE = __name__.partition(".")[0]
+"""Name of the package whose indenters return what `Indenter.mesh` promises."""
 
 FACET_ERROR = 4e-4
 """Largest distance (mm) of facets from the exact shape: a hundredth of the width that a pixel of
@@ -56,7 +60,8 @@ class Indenter(Protocol):
             facet_error: largest distance of the facets from the exact shape, mm.
 
         Returns:
-            A mesh with outward shading normals in the indenter's frame.
+            A mesh with outward shading normals in the indenter's frame, whose lowest point is at
+            z = 0, except for the error of the facets.
         """
         ...
 
@@ -198,6 +203,40 @@ class IndenterKind(ABC):
         return cls(**numbers)
 
 
+def mesh_of(indenter: Indenter, reach: float, facet_error: float = FACET_ERROR) -> TriangleMesh:
+    """Return the mesh of an indenter (see `Indenter.mesh`), which is checked if its class is not of
+    this package.
+
+    Raises:
+        OwnCodeError: the method `mesh` fails, or returns what can't be pressed in.
+        MeshError, ContactError: a mesh file can't be read, or is empty or of the wrong size.
+    """
+    if type(indenter).__module__.partition(".")[0] == OWN_PACKAGE:
+        return indenter.mesh(reach, facet_error)
+    name = getattr(indenter, "kind", type(indenter).__name__)
+    what, where = f"mesh() of the indenter '{name}'", place_of_definition(type(indenter).mesh)
+    with failures_named(what, where):
+        mesh = indenter.mesh(reach, facet_error)
+    problem = _misfit(mesh, name, facet_error)
+    if problem is None:
+        return mesh
+    raise OwnCodeError(f"{what} returned {problem}", where=where, hint=REPAIR)
+
+
+def _misfit(mesh: object, name: str, facet_error: float) -> str | None:
+    """Return why an object is no mesh of an indenter with facets as near to it, mm; or None."""
+    if not isinstance(mesh, TriangleMesh):
+        return f"{brief(repr(mesh))} instead of a TriangleMesh"
+    try:
+        mesh.validate(name, closed=False)
+    except MeshError as error:
+        return f"a mesh that can't be used: {error.message}"
+    lowest = mesh.bounds[0, 2]
+    if abs(lowest) > facet_error:
+        return f"a mesh whose lowest point is at z = {lowest:g} instead of 0"
+    return None
+
+
 @dataclass(frozen=True)
 class Tilted:
     """An indenter rotated about its x and then its y axis, and moved along z so that its lowest
@@ -217,7 +256,7 @@ class Tilted:
 
     def mesh(self, reach: float, facet_error: float = FACET_ERROR) -> TriangleMesh:
         """Return the mesh of the whole rotated indenter; see `Indenter.mesh`."""
-        whole = self.indenter.mesh(np.inf, facet_error)
+        whole = mesh_of(self.indenter, np.inf, facet_error)
         return lowest_at_zero(whole.transformed(turn_about_axes(self.tilt_x, self.tilt_y)))
 
 

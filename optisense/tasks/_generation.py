@@ -19,6 +19,7 @@ from optisense.design.storage import files_of
 from optisense.errors import ContactError, TaskError
 from optisense.folders import LOCK_FILE, FolderLock, held
 from optisense.geometry import Contact, Indenter
+from optisense.geometry.indenter_kinds import mesh_of
 from optisense.library import with_own_lights
 from optisense.picture_files import write_picture
 from optisense.reading.camera_noise import add_camera_noise
@@ -129,7 +130,7 @@ class _Maker:
         self._settings = settings
         self._indenters = settings.contacts.parsed()
         for indenter in self._indenters.values():
-            indenter.mesh(1.0)  # reads mesh files, so that errors are reported before any work
+            mesh_of(indenter, 1.0)  # reads mesh files, so that errors are reported before any work
         width, height = settings.resolution or model.design.camera.resolution
         self._resolution = int(width), int(height)
         self._exposure = self._exposure_of_all(lock)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from optisense.errors import ContactError, MeshError
+from optisense.errors import ContactError, MeshError, OwnCodeError
 from optisense.geometry import (
     Contact,
     Cylinder,
@@ -21,6 +21,7 @@ from optisense.geometry import (
     place,
 )
 from optisense.geometry.contact_text import parse_place
+from optisense.geometry.indenter_kinds import Tilted
 
 GEL = TriangleMesh.box((-12, -10, -4.25), (12, 10, 0), (24, 20, 2))
 
@@ -77,6 +78,34 @@ def test_an_indenter_checks_its_numbers_when_it_is_made() -> None:
     for kind, given in ((Sphere, "3"), (Sphere, None), (Sphere, np.ones(2)), (MeshIndenter, 3)):
         with pytest.raises(ContactError, match="ndenter"):
             kind(given)  # type: ignore[arg-type]
+
+
+UP = TriangleMesh.box((-1, -1, 0), (1, 1, 2))
+
+
+@pytest.mark.parametrize(
+    ("made", "words"),
+    [
+        (lambda reach, facet_error: None, "returned None"),
+        (lambda reach, facet_error: (UP.vertices, UP.faces), "returned \\("),
+        (lambda reach, facet_error: 1 / 0, "fails: ZeroDivisionError"),
+        (lambda reach: UP, "fails: TypeError"),
+        (lambda reach, facet_error: UP.with_faces(UP.faces[:0]), "no triangles"),
+        (lambda reach, facet_error: UP.with_faces(UP.faces + 1), "does not exist"),
+        (lambda reach, facet_error: TriangleMesh(UP.vertices * math.nan, UP.faces), "not finite"),
+        (lambda reach, facet_error: TriangleMesh(UP.vertices + 0.3, UP.faces), "at z = 0.3"),
+    ],
+)
+def test_what_a_class_of_the_user_makes_is_checked(made: Any, words: str) -> None:
+    class Own:
+        mesh = staticmethod(made)
+
+    for indenter in (Own(), Tilted(Own(), 10, 0)):
+        with pytest.raises(
+            OwnCodeError, match=f"mesh\\(\\) of the indenter 'Own' .*{words}"
+        ) as told:
+            place(Contact(indenter, depth=0.3), FLAT, GEL)
+        assert told.value.where is not None and told.value.where.startswith(__file__)
 
 
 @pytest.mark.parametrize(
