@@ -43,6 +43,14 @@ def test_every_public_name_loads_and_is_listed(package: str) -> None:
         assert name in vars(module)
 
 
+def test_an_integrator_of_normals_is_made_of_public_names() -> None:
+    from optisense.reading import integration
+
+    assert set(integration.__all__) >= {"NormalIntegrator", "UntouchedSurface"}
+    for name in integration.__all__:
+        assert getattr(integration, name).__name__ == name
+
+
 def test_search_is_a_package_with_the_function_in_it() -> None:
     from optisense import search
 

@@ -16,6 +16,8 @@ from optisense.errors import TaskError
 from optisense.reading.tilts import STEEPEST
 from optisense.reading.untouched import UntouchedSurface
 
+__all__ = ["GridIntegrator", "NormalIntegrator", "UntouchedSurface"]
+
 ROUNDS = 3
 """Number of rounds of `NormalIntegrator.depths`: the change of a ray's direction between pixels,
 times the depth, is a correction of some per cent, and each round makes its error that much
@@ -110,7 +112,9 @@ class NormalIntegrator:
     """
 
     def __init__(self, untouched: UntouchedSurface) -> None:
-        """Prepare the integration for a sensor's surface and rays at the image's resolution."""
+        """Prepare the integration for a sensor's surface and rays at the image's resolution:
+        ``UntouchedSurface.of(model.chief_rays((w, h)))``.
+        """
         self._untouched = untouched
         self._grid = GridIntegrator(untouched.seen)
 
