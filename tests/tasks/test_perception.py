@@ -23,10 +23,10 @@ from optisense.tasks import (
     ReconstructionSettings,
     SampleSettings,
     perceive,
+    signal_to_noise,
 )
 from optisense.tasks._misalignment import plane_contact
 from optisense.tasks._perception import collect
-from optisense.tasks._snr import signal_to_noise
 
 QUIET = SampleSettings(count=40, camera_noise=0.0, skin="conforming")
 """Settings for colours from algebra, which does not depend on how the gel deforms; the conforming
@@ -237,3 +237,12 @@ def test_a_real_sensor_tells_angles(mini: OpticalModel) -> None:
     settings = SampleSettings(count=16, resolution=(32, 24), photons=60_000, skin="conforming")
     samples = collect(Misalignment(), mini, settings)
     assert signal_to_noise(samples.features, samples.targets) > 2
+
+
+@pytest.mark.slow
+def test_colours_of_a_real_sensor_spread_over_thin_cylinders(mini: OpticalModel) -> None:
+    settings = SampleSettings(count=8, resolution=(32, 24), photons=60_000, skin="conforming")
+    samples = collect(CylinderRadius(), mini, settings)
+    across = samples.features[:, [0, 2]].sum(axis=1)  # red and blue light lie on its two sides
+    # At the border of a contact of depth d, normals have a sine of about sqrt(2 d / r).
+    assert np.corrcoef(across, samples.targets[:, 0] ** -0.5)[0, 1] > 0.9
