@@ -121,8 +121,8 @@ def test_groups_rendered_together_add_up_to_the_same_lights_in_one_group() -> No
 
 def test_a_seed_gives_the_same_image_whatever_was_pressed_before_and_another_does_not() -> None:
     used = OpticalModel(design(), "llvm")
-    used.render([ASIDE], FEW_PIXELS, FEW_PHOTONS)
-    used.render((), FEW_PIXELS, FEW_PHOTONS)
+    render(used, ASIDE)
+    render(used)
     # No test presses anything but this ball into the shared model.
     assert same(render(used, BALL), pressed())
     assert not same(render(used, BALL, seed=5), pressed())
