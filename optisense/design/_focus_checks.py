@@ -31,7 +31,7 @@ def focus_problem(design: SensorDesign, meshes: Meshes) -> Diagnostic | None:
     camera = design.camera
     if camera.blur is None or not camera.blur.by_depth or design.parts_of(Role.MIRROR):
         return None
-    vergences = apparent_vergences(design, meshes)
+    vergences = straight_vergences(design, meshes)
     if not vergences.size:
         return None
     deviation = SoftFocus.of(camera.blur, camera, vergences[None]).deviation[0]
@@ -52,7 +52,7 @@ def focus_problem(design: SensorDesign, meshes: Meshes) -> Diagnostic | None:
     )
 
 
-def apparent_vergences(design: SensorDesign, meshes: Meshes) -> FloatArray:
+def straight_vergences(design: SensorDesign, meshes: Meshes) -> FloatArray:
     """Return the inverses (k, 2), 1/mm, of the apparent distances of the sensing surface along the
     straight rays that meet it before any blocker, across and in the plane of incidence.
 

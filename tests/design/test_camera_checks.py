@@ -10,7 +10,7 @@ import shapely
 
 from optisense import sensors
 from optisense.design import Diagnostic, SensorDesign, check_design, set_value
-from optisense.design._focus_checks import apparent_vergences
+from optisense.design._focus_checks import straight_vergences
 from optisense.design.arrangement import SAMPLES, SAMPLES_TURN, straight_rays
 from optisense.design.camera_checks import camera_fault, view_shares
 from optisense.geometry import TriangleMesh
@@ -144,7 +144,7 @@ class TestFocus:
     def test_layers_appear_as_thick_as_they_are_over_their_index(self, mini: SensorDesign) -> None:
         """13 mm of air, 5 mm of acrylic and 4.25 mm of gel, for a flat field of focus. In the plane
         of incidence they appear thinner off the axis."""
-        across, along = 1.0 / apparent_vergences(mini, mini.deformed_meshes()).T
+        across, along = 1.0 / straight_vergences(mini, mini.deformed_meshes()).T
         assert len(across) == SAMPLES
         middle = 13.0 + 5.0 / 1.491 + 4.25 / 1.41
         assert across == pytest.approx(middle, rel=1e-6)

@@ -241,7 +241,7 @@ def test_the_check_of_the_focus_knows_where_the_skin_appears_behind_a_wedge() ->
     design = behind_a_wedge(35.0)
     model = OpticalModel(design)
     traced = apparent_vergences(model.scenes.fine.scene, model.camera((32, 24)))
-    straight = _focus_checks.apparent_vergences(design, design.deformed_meshes())
+    straight = _focus_checks.straight_vergences(design, design.deformed_meshes())
     found, true = (np.median(each.mean(axis=-1)) for each in (straight, traced))
     assert found == pytest.approx(true, rel=0.015)
 
