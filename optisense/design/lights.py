@@ -1,4 +1,4 @@
-"""Light groups: lights of one type and colour, each with a pose, and spectra of their dies."""
+"""Light groups: lights of one type and colour, each with a pose, and spectra of their LEDs."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Light(Model):
 
 
 class Spectrum(Model):
-    """Light of one die of an LED: a Gaussian over wavelength."""
+    """Light of one LED, red, green or blue: a Gaussian over wavelength."""
 
     wavelength: Annotated[Number, Field(ge=380.0, le=780.0)] = Field(
         description="dominant wavelength by the datasheet, taken as the middle",
@@ -72,17 +72,17 @@ class Spectrum(Model):
 
 
 class LightSpectra(Model):
-    """Spectra of a light's dies. Light of a die without one belongs to its own channel alone."""
+    """Spectra of a light's LEDs. Light of an LED without one belongs to its own channel alone."""
 
     red: Spectrum | None = None
     green: Spectrum | None = None
     blue: Spectrum | None = None
 
     def spread(self) -> NDArray[np.float64]:
-        """Return the shares (3, 3) of each die's light (rows) in R, G and B; rows sum to 1."""
-        dies = (self.red, self.green, self.blue)
+        """Return the shares (3, 3) of each LED's light (rows) in R, G and B; rows sum to 1."""
+        leds = (self.red, self.green, self.blue)
         return np.array(
-            [own if die is None else die.shares() for die, own in zip(dies, np.eye(3), strict=True)]
+            [own if led is None else led.shares() for led, own in zip(leds, np.eye(3), strict=True)]
         )
 
 
@@ -100,7 +100,7 @@ class LightGroup(Model):
     spectrum: LightSpectra | None = Field(
         default=None,
         exclude_if=is_left_out,
-        description="spectra of the red, green and blue dies; without them, each die emits in its "
+        description="spectra of the red, green and blue LEDs; without them, each LED emits in its "
         "own channel",
     )
     lights: Annotated[list[Light], Field(min_length=1, max_length=MOST_LIGHTS)] = Field(
@@ -116,12 +116,12 @@ class LightGroup(Model):
     def channel_flux(self) -> NDArray[np.float64]:
         """Return the radiant flux of each light in R, G and B, (3,) mW; they sum to `flux`.
 
-        `colour` shares the flux among the dies, and `spectrum` the light of each die among R, G
+        `colour` shares the flux among the LEDs, and `spectrum` the light of each LED among R, G
         and B.
         """
         colour = np.array(self.colour)
-        dies = self.flux * colour / colour.sum()
-        return np.asarray(dies if self.spectrum is None else dies @ self.spectrum.spread())
+        leds = self.flux * colour / colour.sum()
+        return np.asarray(leds if self.spectrum is None else leds @ self.spectrum.spread())
 
 
 def of_model(model: str) -> dict[str, Any]:
