@@ -33,7 +33,7 @@ def self_crossings(mesh: TriangleMesh, limit: int | None = None) -> Crossings:
     count. The search ends after `limit` crossings.
     """
     pairs = overlapping_pairs(*mesh.face_bounds)
-    return _crossings(mesh, mesh, _solid(mesh, mesh, pairs), limit)
+    return _crossings(mesh, mesh, _with_area(mesh, mesh, pairs), limit)
 
 
 def crossings(first: TriangleMesh, second: TriangleMesh, limit: int | None = None) -> Crossings:
@@ -50,15 +50,15 @@ def near_pairs(first: TriangleMesh, second: TriangleMesh) -> BoxPairs:
     (k,) of the second.
     """
     pairs = overlapping_boxes(*first.face_bounds, *second.face_bounds)
-    return _solid(first, second, pairs)
+    return _with_area(first, second, pairs)
 
 
-def _solid(first: TriangleMesh, second: TriangleMesh, batches: BoxPairs) -> BoxPairs:
+def _with_area(first: TriangleMesh, second: TriangleMesh, batches: BoxPairs) -> BoxPairs:
     """Leave out pairs with a face without area."""
     for one, other in batches:
-        solid = (first.face_areas[one] > 0.0) & (second.face_areas[other] > 0.0)
-        if solid.any():
-            yield one[solid], other[solid]
+        kept = (first.face_areas[one] > 0.0) & (second.face_areas[other] > 0.0)
+        if kept.any():
+            yield one[kept], other[kept]
 
 
 def _crossings(

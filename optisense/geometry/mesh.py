@@ -345,8 +345,8 @@ class TriangleMesh:
 
     @cached_property
     def _as_rest(self) -> TriangleMesh:
-        """A copy, so that deformed meshes keep no reference to a mesh that is no more used: caches
-        by mesh, which hold deformed ones, would never be freed.
+        """A copy, so that deformed meshes keep no reference to a mesh that is no longer used:
+        caches by mesh, which hold deformed ones, would never be freed.
         """
         return replace(self)
 

@@ -33,7 +33,7 @@ def smooth_corners(
     """Compute corner normals, and split the vertices whose corners disagree.
 
     Args:
-        mesh: the mesh; of its own shading normals is used only where they differ.
+        mesh: the mesh; its own shading normals only decide where edges are sharp.
 
     Returns:
         The old number (k,) of each new vertex, faces (m, 3) int32 of the new vertices, and their
