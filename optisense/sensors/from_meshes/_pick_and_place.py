@@ -34,12 +34,17 @@ LONGEST_LINE = 10_000
 """Most characters of one line. A row of the programs named above has a few hundred; Python's reader
 of tables refuses cells of more than 131,072."""
 
+FARTHEST = 1e-3
+"""Largest z, mm, of a part that counts as 0: the rounding of coordinates in such files, and far
+below the thickness of any board."""
+
 LARGEST = 10_000.0
 """Largest coordinate of a part, mm, and rotation, degrees: panels are smaller than a metre."""
 
 _UNIT = re.compile(r"\b(mm|mils?|inch(?:es)?|in|thou)\b", re.IGNORECASE)
-_NUMBER = re.compile(r"([-+]?\d*\.?\d+(?:[eE][-+]?\d+)?)\s*(mm|mils?|inch|in)?$", re.IGNORECASE)
-_ZERO = re.compile(r"[-+]?0*[.,]?0*(?:e[-+]?\d+)?\s*(?:mm|mils?|inch|in)?$", re.IGNORECASE)
+_NUMBER = re.compile(
+    r"([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*(mm|mils?|thou|inch(?:es)?|in|\")?$", re.IGNORECASE
+)
 _ANGLE = re.compile(
     r"([-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:e[-+]?\d+)?)\s*(?:[°º]|deg(?:rees?)?)?$", re.IGNORECASE
 )
@@ -184,7 +189,9 @@ def _placed(
 
 def _part(cells: dict[str, str], unit: str | None, path: Path, number: int) -> BoardPart:
     name = cells["designator"]
-    if not _ZERO.match(cells["z"]):
+    # A decimal comma is no mistake in a z that is 0, and neither is a unit that the file lacks.
+    z = _length(cells["z"].replace(",", ".") or "0", unit or "mm", path, number)
+    if abs(z) > FARTHEST:
         raise DesignError(
             f"'{brief(cells['z'])}', the z of '{brief(name)}', is not 0: this is a position in "
             "space, and one on a board is needed",
@@ -243,5 +250,5 @@ def _length(text: str, unit: str | None, path: Path, number: int) -> float:
             where=str(path),
             hint="Give it beside the file: units: mm, or units: mil",
         )
-    known = {"mils": "mil", "thou": "mil", "in": "inch", "inches": "inch"}
+    known = {"mils": "mil", "thou": "mil", "in": "inch", "inches": "inch", '"': "inch"}
     return float(match[1]) * MM_PER[known.get(given, given)]

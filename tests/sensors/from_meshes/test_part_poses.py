@@ -258,13 +258,18 @@ def test_rows_that_are_not_chosen_may_be_faulty(tmp_path: Path) -> None:
         "Ref,X_mm,Y_mm,Z_mm,Rot,Side\nREF**,1,1,,0,top\nREF**,9,1,0,0,top\n"
         "X1,5,5,0,N/A,top\nX2,6,6,0,0,MultiLayer\nD1,2,3,0.0,90,top\n"
         'D2,4,3,"-0,00 mm",90,top\nH1,7,7,1.6,0,top\nH2,7,9,"1,6",0,top\nH3,7,9,3.,0,top\n'
+        'D3,6,3,0 thou,90,top\nD4,8,3,0.0",90,top\nD5,9,3,1e-17,90,top\n'
+        "H4,7,7,-,0,top\nH5,7,7,e5,0,top\nH6,7,7,mm,0,top\n"
     )
     found = read_pick_and_place(file)[0]
     choice = FromTable(file=file.name, only="D*", origin=(0.0, 0.0, 0.0), gap=0.0)
     lights = from_table(choice, found)
-    assert [light.position for light in lights] == [(2.0, 3.0, 0.0), (4.0, 3.0, 0.0)]
+    assert [light.position for light in lights] == [
+        (x, 3.0, 0.0) for x in (2.0, 4.0, 6.0, 8.0, 9.0)
+    ]
     faults = {"REF**": "also in line 2", "X1": "'N/A' is no", "X2": "no side"}
     faults |= {"H1": "'1.6', .* is not 0.*csv:8", "H2": "'1,6', .* not 0", "H3": "'3.', .* not 0"}
+    faults |= {"H4": "'-' is no length", "H5": "'e5' is no", "H6": "'mm' is no"}
     for only, words in faults.items():
         with pytest.raises(DesignError, match=words):
             from_table(choice.model_copy(update={"only": only}), found)
