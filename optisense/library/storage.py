@@ -129,8 +129,9 @@ def own_file(kind: Kind, name: str) -> Path | None:
     there is no such entry.
     """
     file = own_folder() / f"{kind}s" / f"{name}.yaml"
-    leads_elsewhere = name != file.stem or name.startswith(".")
-    return file if not leads_elsewhere and os.path.lexists(file) else None
+    if name != file.stem or name.startswith("."):  # a path, or a hidden file
+        return None
+    return file if os.path.lexists(file) else None
 
 
 def write_own(
