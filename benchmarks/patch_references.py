@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.light_tracing import light_traced
-from benchmarks.mitsuba_export import mitsuba_scene
+from benchmarks.mitsuba_export import PATH_DEPTH, mitsuba_scene
 from benchmarks.mitsuba_path import scene_with
 from benchmarks.reference import window_camera
 from optisense import OpticalModel
@@ -77,7 +77,9 @@ class Effort:
 
     def name(self, referee: Referee) -> str:
         """Return the effort in the digest of a picture's file."""
-        return f"{self.samples}" if referee is Referee.PATH else f"{LIGHT_PASSES}x{self.photons}"
+        if referee is Referee.PATH:
+            return f"{self.samples} of {PATH_DEPTH} surfaces"
+        return f"{LIGHT_PASSES}x{self.photons}"
 
     def count(self, referee: Referee) -> int:
         """Return the number of samples per pixel or of photons of a picture."""

@@ -6,8 +6,9 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+from benchmarks import patch_references
 from benchmarks.light_tracing import FilmMap
-from benchmarks.patch_references import ray_offset_shift
+from benchmarks.patch_references import USUAL, Referee, ray_offset_shift
 from benchmarks.patches import PatchCase, compare
 from optisense import OpticalModel
 
@@ -59,3 +60,12 @@ def test_light_tracing_keeps_the_photons_on_the_tip_of_a_ball() -> None:
     assert tip[2] < points[:, 2].min() - 0.001
     film = FilmMap.fit(points, np.zeros((len(points), 2)))
     assert all(film.contains(mi.Point3f(*map(float, tip))))
+
+
+def test_pictures_of_paths_of_different_lengths_are_kept_apart(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    names = [USUAL.name(referee) for referee in Referee]
+    monkeypatch.setattr(patch_references, "PATH_DEPTH", 64)
+    path, light = (USUAL.name(referee) for referee in Referee)
+    assert path != names[0] and light == names[1]
