@@ -4,6 +4,7 @@ part.
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 import traceback
@@ -87,7 +88,8 @@ def error_of_own_code(error: BaseException) -> OwnCodeError | None:
 def failures_named(what: str, where: str) -> Iterator[None]:
     """Context for a call of a user's code, in which an error names what failed.
 
-    Errors that have a message for the user anyhow are left as they are; see `as_user_error`.
+    Errors that have a message for the user anyhow (see `as_user_error`), and defects of this
+    package, are left as they are.
 
     Args:
         what: what is called, with its name.
@@ -102,6 +104,8 @@ def failures_named(what: str, where: str) -> Iterator[None]:
         raise
     except Exception as error:
         own = error_of_own_code(error)
+        if own is None and where.startswith(f"{HOME}{os.sep}"):
+            raise
         raise OwnCodeError(
             f"{what} fails: {type(error).__name__}: {error}",
             where=where if own is None else own.where,

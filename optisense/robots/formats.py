@@ -8,7 +8,8 @@ from pathlib import Path
 
 from optisense.design import SensorDesign
 from optisense.errors import OutputError, OwnCodeError
-from optisense.registry import Registry, must_be
+from optisense.own_code import failures_named
+from optisense.registry import Registry, must_be, place_of_definition
 from optisense.robots._body import SensorBody, sensor_body
 from optisense.robots._mjcf import mjcf
 from optisense.robots._urdf import urdf, without_friction
@@ -78,7 +79,7 @@ def export_robot(
         DesignError: see `sensor_body`; or two parts differ in upper and lower case only.
         OutputError: there is no such format, the folder can't be written, or it holds a design or
             files of the user with such names.
-        OwnCodeError: the function of a format returned something other than text.
+        OwnCodeError: the function of a format failed, or returned something other than text.
     """
     wanted = [formats] if isinstance(formats, str) else formats
     kinds = [ROBOT_FORMATS.find(name) for name in dict.fromkeys(wanted)]
@@ -100,13 +101,14 @@ def export_robot(
 
 
 def _text_of(kind: RobotFormat, body: SensorBody) -> str:
-    text: object = kind.text(body, MESHES)
+    name = getattr(kind.text, "__qualname__", str(kind.text))
+    what = f"the function '{name}' of the format '{kind.suffix}'"
+    with failures_named(what, place_of_definition(kind.text)):
+        text: object = kind.text(body, MESHES)
     if not isinstance(text, str):
-        name = getattr(kind.text, "__qualname__", str(kind.text))
         raise OwnCodeError(
-            f"the function '{name}' of the format '{kind.suffix}' returned "
-            f"{type(text).__name__} instead of text",
-            where=getattr(kind.text, "__module__", None),
+            f"{what} returned {type(text).__name__} instead of text",
+            where=place_of_definition(kind.text),
             hint="Let it return the content of the file as one string",
         )
     return text

@@ -11,6 +11,8 @@ from pathlib import Path
 from optisense.design import SensorDesign
 from optisense.earlier_results import holds_earlier_results, refuse_to_replace
 from optisense.errors import DesignError, OutputError
+from optisense.own_code import failures_named
+from optisense.registry import place_of_definition
 from optisense.workshop._assembly_files import assembly_files
 from optisense.workshop._bill_of_materials import bill_of_materials
 from optisense.workshop._drawings import cut_file, drawing
@@ -61,6 +63,7 @@ def export(
         OutputError: there is no such format, two formats have files of one name, a format writes
             none, the folder can't be written, or it holds a design or files of the user with such
             names.
+        OwnCodeError: the function of a format of another package fails.
     """
     wanted = list(dict.fromkeys([formats] if isinstance(formats, str) else formats))
     for name in wanted:
@@ -117,7 +120,9 @@ class _ShapeWriter:
     shapes: Sequence[Shape]
 
     def __call__(self, path: Path) -> object:
-        notes = self.kind.write(path, self.title, self.shapes)
+        where = place_of_definition(self.kind.write)
+        with failures_named(f"the file format '{self.name}'", where):
+            notes = self.kind.write(path, self.title, self.shapes)
         if not path.exists():
             raise OutputError(
                 f"the format '{self.name}' wrote no file",

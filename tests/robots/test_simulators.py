@@ -149,6 +149,10 @@ def test_a_format_without_text_is_named(tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.setattr("optisense.robots.formats.ROBOT_FORMATS.find", lambda name: silent)
     with pytest.raises(OwnCodeError, match=r"no_text' of the format '\.sdf' returned NoneType"):
         export_robot(sensors.build("gelsight-mini"), tmp_path, "silent")
+    failing = RobotFormat(".sdf", lambda body, meshes: str(1 / 0))
+    monkeypatch.setattr("optisense.robots.formats.ROBOT_FORMATS.find", lambda name: failing)
+    with pytest.raises(OwnCodeError, match=r"of the format '\.sdf' fails: ZeroDivisionError"):
+        export_robot(sensors.build("gelsight-mini"), tmp_path, "failing")
     assert not list(tmp_path.iterdir())
 
 

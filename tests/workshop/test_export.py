@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from optisense.design import Part, Role, SensorDesign
-from optisense.errors import DesignError, OutputError
+from optisense.errors import DesignError, OutputError, OwnCodeError
 from optisense.geometry import TriangleMesh
 from optisense.robots import export_robot
 from optisense.workshop import FORMATS, ShapeFormat, export
@@ -99,6 +99,15 @@ def test_files_of_an_earlier_export_are_named(flat: SensorDesign, tmp_path: Path
     (first, *_) = flat.parts
     export_robot(with_part_renamed(renamed, first, "other"), tmp_path / "robot", notes=told)
     assert told[-1].endswith(f"meshes/guide.stl, meshes/{first}.stl")
+
+
+def test_a_format_that_fails_is_named(flat: SensorDesign, tmp_path: Path) -> None:
+    failing = ShapeFormat(".bad", lambda path, title, shapes: 1 / 0)
+    with FORMATS.forgetting():
+        FORMATS.register("bad", failing)
+        with pytest.raises(OwnCodeError, match="the file format 'bad' fails: ZeroDiv") as told:
+            export(flat, tmp_path, "bad")
+    assert told.value.where is not None and told.value.where.startswith(__file__)
 
 
 @pytest.mark.parametrize("holds_all", [False, True])
