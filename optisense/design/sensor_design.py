@@ -387,6 +387,15 @@ def refuse_no_design(given: object) -> None:
     )
 
 
+def refuse_design(given: object) -> None:
+    """Raise DesignError if an argument is a design, or the name of one, and no optical model."""
+    if isinstance(given, SensorDesign | str | Path):
+        raise DesignError(
+            f"an optical model is needed, not {type(given).__name__} {given!r:.60}",
+            hint="Make one with optisense.OpticalModel(design)",
+        )
+
+
 def place_of(path: Steps, source: str, lines: Mapping[Steps, int]) -> str:
     """Return file and line of a value, or of the innermost one around it that has a line.
 

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.design.sensor_design import refuse_design
 from optisense.errors import RenderError
 from optisense.keyword_types import plain_numbers
+from optisense.optics._render_settings import number_of_photons
 from optisense.optics._skin_view import VIEW_ACROSS
 from optisense.optics.backend.arrays import indices
 from optisense.optics.scene.assembly import Assembly
@@ -163,7 +165,7 @@ class LightLedger:
 
 def light_ledger(
     model: OpticalModel,
-    photons: int = PICTURE_PHOTONS,
+    photons: int | str = PICTURE_PHOTONS,
     seed: int = 0,
     seen: TargetCells | None = None,
 ) -> LightLedger:
@@ -174,14 +176,15 @@ def light_ledger(
 
     Args:
         model: the sensor.
-        photons: number of photons of all lights together.
+        photons: number of photons of all lights together, or a level of `optisense.quality`.
         seed: seed of the photons.
         seen: result of `cells_in_view` for the model, if it is known.
 
     Raises:
-        RenderError: there are too few photons.
+        DesignError: there is a design instead of a model.
+        RenderError: there are too few photons, or there is no such level.
     """
-    refuse_few_photons(model, photons)
+    photons = enough_photons(model, photons)
     pieces = model.scenes.pieces
     seen = cells_in_view(model) if seen is None else seen
     bookings = trace_ledger(
@@ -222,14 +225,22 @@ def light_ledger(
     return LightLedger(emitted, entries, photons, exits)
 
 
-def refuse_few_photons(model: OpticalModel, photons: int) -> None:
-    """Raise RenderError if there are fewer than 100 photons for each light."""
+def enough_photons(model: OpticalModel, given: int | str) -> int:
+    """Return a number of photons, or that of a level; see `number_of_photons`.
+
+    Raises:
+        DesignError: there is a design instead of a model.
+        RenderError: there is no such level, or there are fewer than 100 photons for each light.
+    """
+    refuse_design(model)
+    photons = number_of_photons(given)
     lights = sum(len(group.lights) for group in model.design.lights.values())
     if photons < 100 * lights:
         raise RenderError(
             f"{photons} photons are too few for {lights} lights",
             hint=f"Give at least {100 * lights}",
         )
+    return photons
 
 
 def _lines_with_noise(

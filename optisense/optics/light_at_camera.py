@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design.lenses.blur import Defocus
+from optisense.design.sensor_design import refuse_design
 from optisense.optics.backend.arrays import floats
 from optisense.optics.camera.projection import RayCamera
 from optisense.quality import PICTURE_PHOTONS
@@ -62,7 +63,9 @@ class CameraLight:
         }
 
 
-def camera_light(model: OpticalModel, photons: int = PICTURE_PHOTONS, seed: int = 0) -> CameraLight:
+def camera_light(
+    model: OpticalModel, photons: int | str = PICTURE_PHOTONS, seed: int = 0
+) -> CameraLight:
     """Compute the irradiance of the lens from a rendered picture.
 
     The irradiance of the lens is the sum of radiance times projected solid angle over the pixels.
@@ -70,9 +73,14 @@ def camera_light(model: OpticalModel, photons: int = PICTURE_PHOTONS, seed: int 
 
     Args:
         model: the sensor.
-        photons: number of photons to trace.
+        photons: number of photons to trace, or a level of `optisense.quality`.
         seed: seed of the photons.
+
+    Raises:
+        DesignError: there is a design instead of a model.
+        RenderError: there is no such level.
     """
+    refuse_design(model)
     resolution = model.design.camera.size_at(WIDTH)
     image = model.render((), resolution, photons, seed=seed)
     camera = model.camera(resolution)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from optisense.geometry.mesh_points import surface_samples
 from optisense.keyword_types import plain_numbers
-from optisense.optics.ledger import cells_in_view, refuse_few_photons
+from optisense.optics.ledger import cells_in_view, enough_photons
 from optisense.optics.transport.light_ledger import BATCHES
 from optisense.optics.transport.photons import TargetCells
 from optisense.optics.transport.place_light import Disc, LightWay, trace_to_place
@@ -109,7 +109,7 @@ class PlaceLight:
 def light_at(
     model: OpticalModel,
     at: Place,
-    photons: int = PICTURE_PHOTONS,
+    photons: int | str = PICTURE_PHOTONS,
     seed: int = 0,
     seen: TargetCells | None = None,
 ) -> PlaceLight:
@@ -119,15 +119,15 @@ def light_at(
         model: the sensor.
         at: the place, given like that of a contact: two coordinates (mm) on the sensing surface, or
             a point (mm) near it in the frame of the design.
-        photons: number of photons of all lights together.
+        photons: number of photons of all lights together, or a level of `optisense.quality`.
         seed: seed of the photons.
         seen: result of `cells_in_view` for the model, if it is known.
 
     Raises:
         ContactError: the place is off the surface.
-        RenderError: there are too few photons.
+        RenderError: there are too few photons, or there is no such level.
     """
-    refuse_few_photons(model, photons)
+    photons = enough_photons(model, photons)
     place = model.surface.point_at(*at) if len(at) == 2 else model.surface.nearest(at)
     right, _ = model.surface.tangents(place.inward)
     up = np.cross(place.inward, right)

@@ -13,7 +13,7 @@ from optisense.errors import TaskError
 from optisense.geometry import Contact, Indenter
 from optisense.geometry.contact_text import INDENTER_FORM, parse_indenter
 from optisense.geometry.indenter_kinds import tilted
-from optisense.keyword_types import set_plain_numbers
+from optisense.keyword_types import is_number, set_plain_numbers
 from optisense.tasks._splits import Cell, cell_of
 
 if TYPE_CHECKING:
@@ -136,15 +136,25 @@ class ContactDraw:
         set_plain_numbers(self)
         if not self.indenters:
             raise TaskError("no indenter is given", hint=INDENTER_FORM)
+        indenters: object = self.indenters
+        if isinstance(indenters, str):
+            raise TaskError(
+                f"the indenters are the text '{indenters}'",
+                hint=f"Write ('{indenters}',), also for a single one",
+            )
         for text in self.indenters:
             if self.indenters.count(text) > 1:
                 raise TaskError(
                     f"the indenter '{text}' is given twice",
                     hint="All are equally likely: name it once",
                 )
-        for name, (low, high) in (("depth", self.depth), ("rotation", self.rotation)):
-            if not (np.isfinite([low, high]).all() and low <= high):
-                raise TaskError(f"the {name} goes from {low:g} to {high:g}", hint="Give LOW:HIGH")
+        for name, given in (("depth", self.depth), ("rotation", self.rotation)):
+            is_pair = isinstance(given, tuple | list) and len(given) == 2
+            if not (is_pair and all(map(is_number, given)) and given[0] <= given[1]):
+                raise TaskError(
+                    f"the range of the {name} is {given!r}",
+                    hint="Give two numbers, the smaller one first",
+                )
         if self.depth[0] <= 0:
             raise TaskError(f"the least depth is {self.depth[0]:g}", hint="Give mm above 0")
         if not 0 <= self.tilt < 90:

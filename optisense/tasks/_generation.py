@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from optisense.design import load_design
 from optisense.design.difference import design_values, mesh_digests
+from optisense.design.sensor_design import refuse_design
 from optisense.design.storage import files_of
 from optisense.errors import ContactError, TaskError
 from optisense.folders import LOCK_FILE, FolderLock, held
@@ -89,12 +90,14 @@ def generate(
         The dataset. Contacts that could not be made are among its failures.
 
     Raises:
+        DesignError: there is a design instead of a model.
         TaskError: the folder holds a dataset with other settings, or of another release.
         FolderInUseError: another process is writing to the folder.
         ContactError, MeshError: an indenter cannot be read.
         OutputError: the folder holds something else, or a file cannot be written.
         KeyboardInterrupt: Ctrl-C was pressed; finished samples are kept for a further call.
     """
+    refuse_design(model)
     if count < 1:
         raise TaskError(f"{count} samples are asked for", hint="Ask for 1 or more")
     chosen = settings or DatasetSettings()

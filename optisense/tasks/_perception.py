@@ -18,6 +18,7 @@ import numpy as np
 
 from optisense.array_types import ByteArray, FloatArray
 from optisense.design.difference import design_values, mesh_digests
+from optisense.design.sensor_design import refuse_design
 from optisense.errors import TaskError
 from optisense.folders import held
 from optisense.geometry import Contact
@@ -186,6 +187,7 @@ def perceive(
         progress: function that is called with the number of finished samples and of all.
 
     Raises:
+        DesignError: there is a design instead of a model.
         TaskError: a contact is not seen, there are too few samples, or the folder holds samples
             with other settings.
         ContactError: a contact is not possible on the sensor.
@@ -218,6 +220,7 @@ def collect(
     progress: Callable[[int, int], None] | None = None,
 ) -> Samples:
     """Render, measure and label `settings.count` random contacts; see `perceive`."""
+    refuse_design(model)
     task.check(model)
     first, _ = _contact(task, model, settings, 0)
     refuse_drags([first], settings.skin)

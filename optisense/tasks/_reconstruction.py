@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.array_types import FloatArray
+from optisense.design.sensor_design import refuse_design
 from optisense.errors import TaskError
 from optisense.geometry import Contact, Cylinder, MeshIndenter, Sphere, TriangleMesh
 from optisense.json_values import json_ready
@@ -204,10 +205,12 @@ def reconstruct(
         progress: function that is called with the number of pictures taken and their total number.
 
     Raises:
+        DesignError: there is a design instead of a model.
         ContactError: an object is off the surface or deeper than the gel, or has a shift or a
             twist on a conforming skin.
         TaskError: an object is not seen, too few presses are seen, or a setting is invalid.
     """
+    refuse_design(model)
     settings = settings or ReconstructionSettings()
     wanted = unseen_objects() if objects is None else dict(objects)
     count = settings.presses + len(wanted)

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 import optisense as ots
 from optisense.cli import app
 from optisense.design.materials import Absorber, Dielectric
-from optisense.errors import RenderError
+from optisense.errors import DesignError, RenderError
 from optisense.optics import OpticalModel, camera_light
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.ledger import (
@@ -176,6 +176,18 @@ def test_the_command_prints_a_table_that_closes_and_writes_json(tmp_path) -> Non
 def test_too_few_photons_are_refused() -> None:
     with pytest.raises(RenderError, match="too few"):
         ledger_of(ots.load("gelsight-mini-ideal"), 10)
+
+
+def test_a_ledger_takes_levels_of_photons_and_no_design() -> None:
+    design = ots.load("gelsight-mini-ideal")
+    model = OpticalModel(design)
+    assert light_ledger(model, "draft").photons == 60_000
+    assert type(light_ledger(model, np.int64(PHOTONS)).photons) is int
+    with pytest.raises(RenderError, match="quick"):
+        light_ledger(model, "quick")
+    for wrong in (light_ledger, camera_light):
+        with pytest.raises(DesignError, match="an optical model is needed"):
+            wrong(design)  # type: ignore[arg-type]
 
 
 def test_a_design_whose_lights_are_off_has_an_empty_ledger(tmp_path) -> None:  # type: ignore[no-untyped-def]

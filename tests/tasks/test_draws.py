@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 
+import optisense as ots
 from optisense import Contact, OpticalModel, set_value
-from optisense.errors import TaskError
+from optisense.errors import DesignError, TaskError
 from optisense.geometry import Cylinder, Plane, Sphere
 from optisense.geometry.indenter_kinds import tilted
 from optisense.geometry.rotations import turn_about_axes
+from optisense.tasks import Misalignment, generate, perceive, reconstruct
 from optisense.tasks._draws import ContactDraw, Places
 
 
@@ -100,6 +105,10 @@ def test_turns_are_about_x_then_y() -> None:
         {"indenters": ("plane", "sphere:1", "plane")},
         {"depth": (0.0, 1.0)},
         {"depth": (1.0, 0.5)},
+        {"depth": 0.3},
+        {"depth": "0.3"},
+        {"depth": (0.1, 0.2, 0.3)},
+        {"rotation": (0.0, None)},
         {"tilt": 90.0},
     ],
     ids=str,
@@ -107,3 +116,20 @@ def test_turns_are_about_x_then_y() -> None:
 def test_senseless_ranges_are_refused(settings: dict) -> None:
     with pytest.raises(TaskError):
         ContactDraw(**settings)
+
+
+def test_indenters_are_no_single_text() -> None:
+    with pytest.raises(TaskError, match=r"Write \('sphere:1.5',\)"):
+        ContactDraw("sphere:1.5")  # type: ignore[arg-type]
+
+
+def test_a_design_is_no_model(tmp_path: Path) -> None:
+    design = ots.load("gelsight-mini-ideal")
+    model: Any = design
+    for call in (
+        lambda: generate(model, tmp_path / "dataset", 1),
+        lambda: perceive(Misalignment(), model),
+        lambda: reconstruct(model),
+    ):
+        with pytest.raises(DesignError, match="an optical model is needed"):
+            call()
