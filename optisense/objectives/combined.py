@@ -14,6 +14,7 @@ from optisense.objectives.named import is_plain
 from optisense.objectives.registry import Objective, find
 from optisense.objectives.score import numbers_of
 from optisense.objectives.scoring import run_objective
+from optisense.text import brief
 
 if TYPE_CHECKING:
     from optisense.objectives.evaluation import Evaluation
@@ -148,9 +149,17 @@ def resolve(wanted: str | Objective | Iterable[str | Objective]) -> list[Objecti
     """Return objectives by name, file or expression; objects that are objectives already are kept.
 
     Raises:
-        ObjectiveError: an objective is unknown, or named twice.
+        ObjectiveError: an objective is unknown, named twice, or neither a text nor an `Objective`.
     """
-    several = [wanted] if isinstance(wanted, str | Objective) else list(wanted)
+    several: list[Any] = [wanted]
+    if isinstance(wanted, Iterable) and not isinstance(wanted, str):
+        several = list(wanted)
+    for each in several:
+        if not isinstance(each, str | Objective):
+            raise ObjectiveError(
+                f"{brief(repr(each))} is no objective",
+                hint="Give its name, or a function with the decorator optisense.objective",
+            )
     found = [each if isinstance(each, Objective) else objective_of(each) for each in several]
     seen: set[str] = set()
     for each in found:

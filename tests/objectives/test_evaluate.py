@@ -257,6 +257,12 @@ def test_a_score_of_zero_has_no_sign() -> None:
     assert str(score_of(find("aoap"), lambda: -0.0).value) == "0.0"
 
 
+@pytest.mark.parametrize("wrong", [5, None, ["aoap", 5], lambda evaluation: 1.0])
+def test_what_is_no_objective_is_refused(evaluation: Evaluation, wrong: Any) -> None:
+    with pytest.raises(ObjectiveError, match="is no objective"):
+        evaluate(evaluation, wrong)
+
+
 def test_ctrl_c_is_not_a_failure(evaluation: Evaluation) -> None:
     def stopped(evaluation: Evaluation) -> float:
         raise KeyboardInterrupt

@@ -15,7 +15,7 @@ import optisense as ots
 from optisense.design import SensorDesign, set_value
 from optisense.design.difference import differences, fingerprint
 from optisense.errors import ObjectiveError, SearchError
-from optisense.search import Around, SearchSpace
+from optisense.search import Around, SearchSpace, search
 from optisense.search.evaluation.evaluator import DesignEvaluator
 from optisense.search.evaluation.relit import RelitEvaluator, can_relight
 from optisense.search.space.constraints import NoCrossings, UserRule, why_forbidden
@@ -108,6 +108,9 @@ class TestBadInput:
             DesignEvaluator(space, ["aoap", "aoap"])
         with pytest.raises(SearchError, match="the search has no objective"):
             DesignEvaluator(space, [])
+        for wrong in (None, 5, ["aoap", None]):
+            with pytest.raises(ObjectiveError, match=r"(None|5) is no objective"):
+                search(mini, {"coating.specularity": (0.0, 1.0)}, wrong)  # type: ignore[arg-type]
         with pytest.raises(ObjectiveError) as told:
             DesignEvaluator(space, ["aoap"], {"photns": 3})
         assert "photons" in str(told.value.hint)

@@ -13,7 +13,13 @@ from typing import Any, ClassVar, Protocol
 from optisense.array_types import FloatArray
 from optisense.design import Role, SensorDesign
 from optisense.design.cage_checks import contact_problems, fold_problems
-from optisense.errors import OptiSenseError, SearchError, SetupError, UnknownPartError
+from optisense.errors import (
+    ObjectiveError,
+    OptiSenseError,
+    SearchError,
+    SetupError,
+    UnknownPartError,
+)
 from optisense.json_values import json_ready
 from optisense.objectives import Objective, Score, Settings, evaluate
 from optisense.objectives.combined import goal_of
@@ -37,6 +43,7 @@ from optisense.search.space.constraints import Constraint, NoCrossings, NoNewPro
 from optisense.search.space.pickling import PickledWithoutCaches
 from optisense.search.space.rigid_moves import PartShift, PartTurn
 from optisense.search.space.search_space import BoundSpace
+from optisense.text import brief
 
 DesignFunction = Callable[[SensorDesign], float]
 """A goal that needs no image, such as a length or a price; higher is better."""
@@ -46,11 +53,19 @@ Goal = str | Objective | DesignFunction
 
 
 def as_goals(objective: Goal | Sequence[Goal]) -> list[Goal]:
-    """Return one objective or several as a list."""
-    if isinstance(objective, list | tuple):
-        return list(objective)
-    single: Any = objective
-    return [single]
+    """Return one objective or several as a list.
+
+    Raises:
+        ObjectiveError: one is neither a name, an `Objective` nor a function.
+    """
+    goals: list[Any] = list(objective) if isinstance(objective, list | tuple) else [objective]
+    for each in goals:
+        if not (isinstance(each, str | Objective) or callable(each)):
+            raise ObjectiveError(
+                f"{brief(repr(each))} is no objective",
+                hint="Give the name of one, or a function of the design",
+            )
+    return goals
 
 
 RELIGHTS = re.compile(r"^lights\..*\.(flux|colour)(\W|$)")
