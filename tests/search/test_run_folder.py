@@ -157,7 +157,7 @@ class TestFolder:
         assert study.settings.scoring == SCORING
         with pytest.raises(SearchError, match=r"nearness was .* and is .* now") as told:
             run_study(study, limit=10)
-        assert "new study with another --out" in str(told.value.hint)
+        assert "new study in another folder" in str(told.value.hint)
         assert (len(study.trials), study.budget) == (6, 5)
         assert len(run_study(Study.open(folder, goals=[goals.nearness]), limit=10).trials) == 11
 

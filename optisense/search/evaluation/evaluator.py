@@ -326,7 +326,8 @@ class DesignEvaluator(PickledWithoutCaches):
             return
         if "seed" in self.settings:
             raise SearchError(
-                "the seed is an argument of the study and not a setting", hint="Give it as --seed"
+                "the seed is an argument of the study and not a setting",
+                hint="Give it beside the settings",
             )
         shared, _ = split_settings(self.settings, self._all_objectives)
         Settings(**shared)

@@ -31,7 +31,7 @@ def as_points(spec: Specification) -> CagePoints:
     if isinstance(spec, CagePoints):
         return spec
     if isinstance(spec, Choice | Integer | Together):
-        raise SearchError("control points take a range of numbers", hint="Give LOW:HIGH")
+        raise SearchError("control points take a range of numbers", hint="Give two bounds")
     return CagePoints(spec)
 
 

@@ -169,7 +169,7 @@ def _of_variable(
         if isinstance(spec, Around):
             spec = spec.about(0.0)
         if not isinstance(spec, Continuous):
-            raise SearchError("this parameter takes a range of numbers", hint="Give LOW:HIGH")
+            raise SearchError("this parameter takes a range of numbers", hint="Give two bounds")
         assert isinstance(now, float)
         return Parameter(variable.path, spec, within(now, spec), variable=variable, asked=asked)
     if not isinstance(spec, Choice):

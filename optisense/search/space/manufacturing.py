@@ -122,7 +122,8 @@ class ManufacturingErrors:
                 raise SearchError(error.message, where=path, hint=error.hint) from None
         if not self.distributions:
             raise SearchError(
-                "there are no manufacturing errors", hint="Name one: --error PATH=SIZE"
+                "there are no manufacturing errors",
+                hint="Name the path of a value and the size of its error",
             )
 
     @property

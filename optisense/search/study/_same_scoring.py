@@ -47,7 +47,7 @@ def refuse_other_definitions(then: Outcome, now: Outcome) -> None:
         raise SearchError(
             "an earlier release scored this study by other definitions: for the same design and "
             f"seed, {'; '.join(changed)}",
-            hint="Begin a new study with another --out; this one can still be reported and applied",
+            hint="Begin a new study in another folder; this one can still be reported and applied",
         )
 
 

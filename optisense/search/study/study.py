@@ -164,7 +164,7 @@ class Study:
                     raise SearchError(
                         f"the design is not the one of this study any more:\n{listed(changed)}",
                         where=str(place),
-                        hint="Undo the changes, or begin a new study with another --out",
+                        hint="Undo the changes, or begin a new study in another folder",
                     )
         except BaseException:
             store.close()
@@ -185,7 +185,7 @@ class Study:
             raise SearchError(
                 f"the study was begun with other settings:\n{listed(changed)}",
                 where=str(self.folder or "the study"),
-                hint="Continue it with its own settings, or begin a new study with another --out",
+                hint="Continue it with its own settings, or begin a new study in another folder",
             )
 
     @property
