@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import drjit as dr
 import numpy as np
 import pytest
 
-from optisense.errors import OutputError
+from optisense.errors import OutputError, RenderError
 from optisense.optics import TactileImage
 from optisense.report import write_report
 from optisense.sensors import gelsight_mini_ideal
@@ -40,12 +41,20 @@ def test_files_are_written_on_one_processor_too(tmp_path: Path) -> None:
     dr.set_thread_count(1)
     try:
         image("red").save(tmp_path / "all")
-        image("red").save_radiance(tmp_path / "radiance.exr")
+        image("red").save_radiance(str(tmp_path / "radiance.exr"))
         assert dr.thread_count() == 1
     finally:
         dr.set_thread_count(before)
     for file in ("all/radiance.exr", "all/layers/red.exr", "radiance.exr"):
         assert (tmp_path / file).stat().st_size > 200
+
+
+@pytest.mark.parametrize("exposure", [np.array([1.0, 2.0, 3.0]), None, "bright", 0.0])
+def test_an_exposure_is_auto_or_above_zero(tmp_path: Path, exposure: Any) -> None:
+    with pytest.raises(RenderError, match="the exposure is"):
+        image("red").picture(exposure)
+    with pytest.raises(RenderError, match="the exposure is"):
+        image("red").save(tmp_path, exposure)
 
 
 def test_another_image_takes_away_what_was_written_about_the_first(tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ from optisense.geometry import TriangleMesh
 from optisense.mechanics import PressedSkin, SkinMaps
 from optisense.optics.backend.variant import threads_for_exr_files
 from optisense.optics.imaging.markers import MarkerPlaces
+from optisense.text import brief
 from optisense.untrusted_files import read_json
 from optisense.writing import inside, is_own_page, removed_together, written_together
 
@@ -44,18 +45,23 @@ def picture(
         RenderError: the exposure is neither "auto" nor a number above 0.
     """
     chain = chain or PictureChain()
-    if exposure == "auto":
-        factor = chain.auto_exposure(radiance)
-    else:
-        try:
-            factor = float(exposure)
-        except ValueError:
-            factor = -1.0
-        if not (np.isfinite(factor) and factor > 0):
-            raise RenderError(
-                f"the exposure is {exposure!r}", hint='give "auto" or a factor above 0'
-            )
+    factor = _factor(exposure, radiance, chain)
     return chain.encode(chain.respond(np.asarray(radiance) * factor, seed=noise_seed))
+
+
+def _factor(exposure: float | str, radiance: FloatingArray, chain: PictureChain) -> float:
+    """Return the factor of an exposure; RenderError if it is neither "auto" nor above 0."""
+    if isinstance(exposure, str) and exposure == "auto":
+        return chain.auto_exposure(radiance)
+    try:
+        factor = float(exposure)
+    except (TypeError, ValueError):
+        factor = -1.0
+    if np.isfinite(factor) and factor > 0:
+        return factor
+    raise RenderError(
+        f"the exposure is {brief(repr(exposure))}", hint='give "auto" or a factor above 0'
+    )
 
 
 RADIANCE_UNIT = "mW/(mm^2 sr)"
@@ -179,14 +185,14 @@ class TactileImage:
         """Return the content of the exposed picture's PNG file, which notebooks show."""
         return _encoded(self.picture(), ".png")
 
-    def save_radiance(self, path: Path) -> None:
+    def save_radiance(self, path: str | Path) -> None:
         """Write the linear radiance as an EXR file.
 
         Raises:
             OSError: the file cannot be written.
         """
         with threads_for_exr_files():
-            _bitmap(self.radiance, path)
+            _bitmap(self.radiance, Path(path))
 
     def save(self, folder: str | Path, exposure: float | str = "auto") -> None:
         """Write the image to a folder.
@@ -199,10 +205,11 @@ class TactileImage:
         removed, these stay as well.
 
         Raises:
+            RenderError: the exposure is neither "auto" nor a number above 0.
             OutputError: a file cannot be written, for instance because the disk is full.
         """
         out = Path(folder)
-        self.settings["exposure"] = self.auto_exposure() if exposure == "auto" else float(exposure)
+        self.settings["exposure"] = _factor(exposure, self.radiance, self.chain)
         maps = self.skin_maps()
         bitmaps = {"image.png": self.picture(exposure), "radiance.exr": self.radiance}
         bitmaps |= {f"layers/{name}.exr": layer for name, layer in self.layers.items()}
