@@ -152,10 +152,10 @@ def refuse_no_contacts(contacts: object) -> None:
     """Raise ContactError if an argument is not a sequence of contacts."""
     if isinstance(contacts, Sequence) and all(isinstance(each, Contact) for each in contacts):
         return
-    raise ContactError(
-        "the argument `contacts` is no list of contacts",
-        hint="Write [contact], also for a single one",
-    )
+    hint = "Write [contact], also for a single one"
+    if isinstance(contacts, Sequence) and any(isinstance(each, str) for each in contacts):
+        hint = "Make each contact of its text with optisense.geometry.parse_contact"
+    raise ContactError("the argument `contacts` is no list of contacts", hint=hint)
 
 
 def locate(contact: Contact, surface: SensingSurface) -> SurfacePoint:

@@ -105,6 +105,8 @@ def load(name_or_folder: str | Path) -> SensorDesign:
         return build(text)
     if not (is_folder(path) or is_file(path)):
         hint = suggestion(text, SENSORS.names(), limit=20)
+        if isinstance(name_or_folder, Path) and text in SENSORS:
+            hint = "Give the name of a built-in sensor as text, not as a path"
         raise DesignError(f"there is no built-in sensor and no folder '{brief(text)}'", hint=hint)
     return load_design(path)
 

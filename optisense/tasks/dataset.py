@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -135,8 +136,9 @@ class Dataset:
 
         Raises:
             TaskError: one of its files is missing or damaged; the message names sample and file.
+            TypeError: the number is a slice, or no whole number.
         """
-        labels = self.labels[number]
+        labels = self.labels[operator.index(number)]
         try:
             arrays = self._arrays(labels["arrays"], SAMPLE_ARRAYS)
             picture = self._existing(labels["file_name"])

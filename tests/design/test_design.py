@@ -159,6 +159,8 @@ def test_designs_with_wrong_meshes_can_be_compared(design: SensorDesign) -> None
 def test_a_name_that_no_folder_can_have() -> None:
     with pytest.raises(DesignError, match="no built-in sensor and no folder"):
         ots.load("a" * 5000)
+    with pytest.raises(DesignError, match=r"no folder 'gelsight-mini'\. Give the name .* as text"):
+        ots.load(Path("gelsight-mini"))
 
 
 @pytest.mark.parametrize("given", ["gelsight-mini-ideal", Path("my-sensor"), None])

@@ -20,6 +20,7 @@ from optisense.geometry import (
     parse_contact,
     place,
 )
+from optisense.geometry.contact import refuse_no_contacts
 from optisense.geometry.contact_text import parse_place
 from optisense.geometry.indenter_kinds import Tilted
 
@@ -264,3 +265,12 @@ def test_a_missing_mesh_file_is_named(tmp_path: Path) -> None:
     contact = parse_contact(f"mesh:{tmp_path}/none.stl@0,0:0.2")
     with pytest.raises(MeshError, match=r"none\.stl"):
         place(contact, FLAT, GEL)
+
+
+@pytest.mark.parametrize(
+    ("given", "hint"),
+    [(["sphere:1.5@0,0:0.5"], "parse_contact"), (Contact(Sphere(2)), r"\[contact\]")],
+)
+def test_an_argument_that_is_no_list_of_contacts_is_refused(given: Any, hint: str) -> None:
+    with pytest.raises(ContactError, match=rf"no list of contacts.*{hint}"):
+        refuse_no_contacts(given)

@@ -213,6 +213,12 @@ def test_other_settings_and_other_designs_are_refused(made: Dataset, mini: Optic
     assert len(Dataset.load(made.folder)) == COUNT
 
 
+def test_samples_are_read_one_at_a_time(made: Dataset) -> None:
+    assert made[np.int64(0)].labels == made[0].labels
+    with pytest.raises(TypeError, match="slice"):
+        made[0:2]  # type: ignore[index]
+
+
 def test_where_numbers_come_from_does_not_matter(made: Dataset) -> None:
     same: SensorDesign = load("gelsight-mini-ideal")
     same.provenance.clear()
