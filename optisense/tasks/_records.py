@@ -84,10 +84,12 @@ class CsvTable:
             while left:  # a disk that becomes full takes a part of it, and refuses the next call
                 left = left[self._file.write(left) :]
             os.fsync(self._file.fileno())
-        except OSError as error:
+        except BaseException as error:  # also Ctrl-C
             self._file.truncate(before)
             self._file.seek(before)
-            raise _cannot_write(self.path, error) from error
+            if isinstance(error, OSError):
+                raise _cannot_write(self.path, error) from error
+            raise
         self.rows.append(text)
 
     def close(self) -> None:

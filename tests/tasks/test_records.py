@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import resource
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -64,6 +65,34 @@ def test_a_row_that_does_not_fit_on_the_disk_leaves_no_trace(tmp_path: Path) -> 
     table.add(ROWS[1])
     table.close()
     assert path.read_bytes() == filled(tmp_path / "whole.csv").path.read_bytes()
+
+
+def test_a_row_that_is_interrupted_leaves_no_trace(tmp_path: Path) -> None:
+    """Ctrl-C comes between two writes of a row, as on a disk that takes a part at a time."""
+
+    class Interrupted:
+        def __init__(self, file: Any) -> None:
+            self._file, self._writes = file, 0
+
+        def write(self, data: bytes) -> int:
+            self._writes += 1
+            if self._writes > 1:
+                raise KeyboardInterrupt
+            return int(self._file.write(data[:2]))
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(self._file, name)
+
+    table = CsvTable(tmp_path / "t.csv", COLUMNS)
+    table.add(ROWS[0])
+    file = table._file
+    table._file = Interrupted(file)  # type: ignore[assignment]
+    with pytest.raises(KeyboardInterrupt):
+        table.add(ROWS[1])
+    table._file = file
+    table.add(ROWS[1])
+    table.close()
+    assert table.path.read_bytes() == filled(tmp_path / "whole.csv").path.read_bytes()
 
 
 def test_readers_leave_out_a_row_that_is_being_written(tmp_path: Path) -> None:
