@@ -45,6 +45,7 @@ SUBFOLDERS = (
     "lights",
     "materials",
     "meshes",
+    "parquet",
     "radiance",
     "renderings",
     "units",

@@ -10,21 +10,21 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.errors import SetupError, TaskError
+from optisense.errors import OutputError, SetupError, TaskError
 from optisense.folders import held
 from optisense.tasks._records import KEPT
 from optisense.tasks._splits import SPLITS, TRAIN
 from optisense.tasks.dataset import LATER_ARRAYS, SAMPLE_ARRAYS, Dataset, Sample
 from optisense.tasks.dataset_tables import NUMBER_COLUMNS, WHOLE_COLUMNS
 from optisense.untrusted_files import MOST_PICTURE, read_bytes
-from optisense.writing import inside, removed_together, written_together
+from optisense.writing import inside, written_together
 
 FOLDER = "parquet"
 
@@ -76,7 +76,8 @@ def write_parquet(
     """Write all samples into the folder `parquet` of a dataset, a few files for each split.
 
     Samples of a release without splits are all in "train". The files appear together, in place of
-    those of an earlier call, which stay if this one fails or is interrupted.
+    those of an earlier call, which stay if this one fails or is interrupted. The earlier ones are
+    removed last, so that a kill never leaves the folder without a complete set.
 
     Args:
         progress: function that is called with the number of samples written and their total number.
@@ -88,7 +89,7 @@ def write_parquet(
         SetupError: the extra is not installed.
         TaskError: a sample is damaged.
         FolderInUseError: another process is writing to the dataset.
-        OutputError: a file can't be written.
+        OutputError: a file can't be written or removed.
     """
     require_parquet()
     done, files = 0, []
@@ -99,25 +100,31 @@ def write_parquet(
         if progress is not None:
             progress(done, len(dataset))
 
-    with (
-        held(dataset.folder),
-        removed_together() as remove,
-        written_together("the results", KEPT) as stage,
-    ):
-        for split in SPLITS:
-            numbers = [
-                k for k, row in enumerate(dataset.labels) if (row["split"] or TRAIN) == split
-            ]
-            count = math.ceil(len(numbers) / SAMPLES_OF_A_FILE)
-            for part in range(count):
-                of_file = numbers[part * SAMPLES_OF_A_FILE : (part + 1) * SAMPLES_OF_A_FILE]
-                name = f"{FOLDER}/{split}-{part:05d}-of-{count:05d}.parquet"
-                file = inside(dataset.folder, name)
-                _write(stage(file), dataset, of_file, report)
-                files.append(file)
-        for earlier in parquet_files(dataset.folder) if files else ():
-            remove(earlier)
+    with held(dataset.folder):
+        with written_together("the results", KEPT) as stage:
+            for split in SPLITS:
+                numbers = [
+                    k for k, row in enumerate(dataset.labels) if (row["split"] or TRAIN) == split
+                ]
+                count = math.ceil(len(numbers) / SAMPLES_OF_A_FILE)
+                for part in range(count):
+                    of_file = numbers[part * SAMPLES_OF_A_FILE : (part + 1) * SAMPLES_OF_A_FILE]
+                    name = f"{FOLDER}/{split}-{part:05d}-of-{count:05d}.parquet"
+                    file = inside(dataset.folder, name)
+                    _write(stage(file), dataset, of_file, report)
+                    files.append(file)
+        if files:
+            _remove(set(parquet_files(dataset.folder)) - set(files))
     return files
+
+
+def _remove(earlier: Iterable[Path]) -> None:
+    """Remove the files of an earlier call once those of this one are there."""
+    try:
+        for file in earlier:
+            file.unlink()
+    except OSError as error:
+        raise OutputError.of(error) from error
 
 
 def _write(

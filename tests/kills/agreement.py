@@ -10,6 +10,7 @@ from pathlib import PurePath
 from typing import Any
 
 import numpy as np
+import pyarrow.parquet as pq
 from PIL import Image
 
 from optisense.optics.imaging.radiance_files import decode_radiance
@@ -69,6 +70,8 @@ def _arrays(suffix: str, data: bytes) -> dict[str, Any]:
             return dict(file)
     if suffix == ".exr":
         return {"": decode_radiance(data).astype(float)}
+    if suffix == ".parquet":
+        return {"": pq.read_table(io.BytesIO(data))["index"].to_numpy()}  # its samples
     return {}
 
 

@@ -106,7 +106,8 @@ WORK: dict[str, Work] = {
     "gradient": _search("gradient", RAYS, 1, "--budget", "12"),
     "gradient, 2 workers": _search("gradient", RAYS, 2, "--budget", "12"),
     "dataset": Work(
-        ("dataset", "gelsight-mini-ideal", "--count", "4", *SMALL, "--out", "@OUT"), share=0.7
+        ("dataset", "gelsight-mini-ideal", "--count", "4", *SMALL, "--parquet", "--out", "@OUT"),
+        share=0.7,
     ),
     "render": Work(("render", "gelsight-mini-ideal", *SMALL, "--out", "@OUT")),
     "calibrate": Work(

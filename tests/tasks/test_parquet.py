@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import json
+import subprocess
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,7 +21,7 @@ from optisense.errors import TaskError
 from optisense.tasks import ContactDraw, Dataset, DatasetSettings, generate, parquet
 from optisense.tasks._splits import SPLITS
 from optisense.tasks.data_card import OURS, write_card
-from optisense.tasks.parquet import ARRAYS, write_parquet
+from optisense.tasks.parquet import ARRAYS, parquet_files, write_parquet
 
 EVIL = "sensor\n---\nlicense: evil | <b>x</b>"
 
@@ -100,6 +102,37 @@ def test_an_interrupted_call_leaves_the_files_of_an_earlier_one(
     assert {file.name: file.read_bytes() for file in folder.iterdir()} == before
     files = write_parquet(made)
     assert len(files) == len(made) and set(folder.glob("t*.parquet")) <= set(files)
+
+
+def test_at_every_moment_the_earlier_files_or_the_new_ones_are_there(
+    made: Dataset, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    earlier = set(write_parquet(made))
+    monkeypatch.setattr(parquet, "SAMPLES_OF_A_FILE", 1)
+    there: list[set[Path]] = []
+
+    def watched(change: Callable[..., Any]) -> Callable[..., Any]:
+        def changed(*given: Any, **more: Any) -> Any:
+            done = change(*given, **more)
+            there.append(set(parquet_files(made.folder)))
+            return done
+
+        return changed
+
+    for name in ("replace", "unlink"):
+        monkeypatch.setattr(Path, name, watched(getattr(Path, name)))
+    new = set(write_parquet(made))
+    assert earlier - new and there[-1] == new
+    assert all(earlier <= each or new <= each for each in there)
+
+
+def test_a_file_that_a_killed_process_was_writing_is_removed(made: Dataset) -> None:
+    ended = subprocess.Popen(["true"])
+    ended.wait()
+    left = write_parquet(made)[0].parent / f".train.{ended.pid}-0123abcd.parquet"
+    left.write_bytes(b"half")
+    write_parquet(made)
+    assert not left.exists()
 
 
 def test_the_card_tells_licence_seed_versions_and_splits(made: Dataset) -> None:
