@@ -404,7 +404,8 @@ def _check_radiance(path: Path, resolution: tuple[int, int]) -> None:
 
     width, height = resolution
     try:
-        radiance = decode_radiance(read_bytes(path, MOST_PICTURE, TaskError, "the radiance"))
+        data = read_bytes(path, MOST_PICTURE, TaskError, "the radiance")
+        radiance = decode_radiance(data, resolution)
         if radiance.shape != (height, width, 3):
             raise ValueError(f"its shape is {radiance.shape}")
     except ValueError as found:
