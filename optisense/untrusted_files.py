@@ -198,7 +198,7 @@ def read_table(path: Path, error: Error, by_hand: bool = False) -> list[dict[str
     """Return the rows of a CSV file as text, by column.
 
     A last line without a line break is left out of a table that is not written by hand: this
-    program was writing it, or could not finish it.
+    program was writing it, or could not finish it. Its first line is always whole.
 
     Args:
         error: class of the exception to raise.
@@ -211,10 +211,15 @@ def read_table(path: Path, error: Error, by_hand: bool = False) -> list[dict[str
     """
     data = read_bytes(path, MOST_TABLE, error, "the table")
     whole = data if by_hand else data[: data.rfind(b"\n") + 1]
+    if data and not whole:
+        raise error("the table has no line break", where=str(path), hint=COPY_AGAIN)
     text = as_text(whole, str(path), error, "the table")
     separator = max(SEPARATORS, key=text.partition("\n")[0].count) if by_hand else ","
     reader = csv.DictReader(
-        io.StringIO(text, newline=""), restval="" if by_hand else None, delimiter=separator
+        io.StringIO(text, newline=""),
+        restval="" if by_hand else None,
+        delimiter=separator,
+        strict=not by_hand,  # a value whose quotes are open at the end of the table is an error
     )
     rows = []
     try:

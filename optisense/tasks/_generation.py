@@ -43,6 +43,7 @@ from optisense.tasks.dataset_tables import (
     read_info,
     read_labels,
 )
+from optisense.text import one_line
 from optisense.untrusted_files import MOST_MESH, MOST_PICTURE, MOST_STEP, damaged, read_bytes
 from optisense.writing import inside, write_json, written_whole
 
@@ -196,7 +197,7 @@ class _Maker:
                 self._write(index, attempt, drawn, image)
                 return
             reason = _too_small(self._resolution)
-        self._failures.add({"index": index, "reason": reason})
+        self._failures.add({"index": index, "reason": one_line(reason)})
 
     def _why_not(self, drawn: DrawnContact) -> str:
         """Return the reason why a contact makes no sample, by its chief rays, or an empty text."""

@@ -104,6 +104,22 @@ def test_readers_leave_out_a_row_that_is_being_written(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"name,value\ra,1\rb,2\r", "no line break"),
+        (b'name,value\n"a",1\nb,"cut\noff', "unexpected end of data"),
+    ],
+    ids=["other line ends", "open quotes"],
+)
+def test_a_table_without_whole_rows_is_refused(
+    content: bytes, message: str, tmp_path: Path
+) -> None:
+    (tmp_path / "t.csv").write_bytes(content)
+    with pytest.raises(TaskError, match=message):
+        read_table(tmp_path / "t.csv", TaskError)
+
+
 def test_other_columns_are_refused(tmp_path: Path) -> None:
     filled(tmp_path / "t.csv")
     with pytest.raises(TaskError, match="other columns"):
