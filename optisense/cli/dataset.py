@@ -43,7 +43,7 @@ def dataset(
         typer.Option(
             "--parquet",
             help="Also write all samples as Parquet files, which Hugging Face's datasets loads. "
-            "Existing ones are always written again.",
+            "Existing ones are written again if they lack a sample, and with --mend.",
         ),
     ] = False,
     licence: Annotated[
@@ -61,7 +61,12 @@ def dataset(
     not changed.
     """
     from optisense.tasks.data_card import check_licence, write_card
-    from optisense.tasks.parquet import parquet_files, require_parquet, write_parquet
+    from optisense.tasks.parquet import (
+        has_all_samples,
+        parquet_files,
+        require_parquet,
+        write_parquet,
+    )
 
     check_licence(licence)
     again = bool(parquet_files(out)) and not parquet
@@ -77,7 +82,8 @@ def dataset(
             model = load_sensor(line, design, out, variant, settings.resolution)
             show = sample_progress(line, model, "samples", "reading the dataset")
             made = generate(model, out, count, settings, show, mend=mend)
-            if parquet or again:
+            stale = (parquet or again) and (mend or not has_all_samples(made))
+            if stale:
                 line.begin("writing Parquet files")
                 write_parquet(made, line.advance)
             write_card(made, licence)
@@ -92,7 +98,7 @@ def dataset(
             )
         raise
     _print_summary(made, count)
-    if again:
+    if again and stale:
         messages.print("the folder's Parquet files were written again, with all samples")
 
 

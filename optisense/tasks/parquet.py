@@ -70,6 +70,26 @@ def parquet_files(folder: Path) -> list[Path]:
     return sorted(file for file in found if OWN_FILE.fullmatch(file.name))
 
 
+def has_all_samples(dataset: Dataset) -> bool:
+    """Return whether the files in a dataset's folder hold each of its samples once.
+
+    Raises:
+        SetupError: the extra is not installed.
+    """
+    require_parquet()
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    found: list[int] = []
+    try:
+        for file in parquet_files(dataset.folder):
+            with pq.ParquetFile(file) as table:
+                found += table.read(columns=["index"])["index"].to_pylist()
+    except (OSError, KeyError, pa.ArrowException):
+        return False
+    return sorted(found) == sorted(row["index"] for row in dataset.labels)
+
+
 def write_parquet(
     dataset: Dataset, progress: Callable[[int, int], None] | None = None
 ) -> list[Path]:

@@ -40,6 +40,16 @@ def test_a_dataset_is_made_and_continued(tmp_path: Path) -> None:
     assert "Parquet files were written again" in text
     files = sorted((folder / "parquet").iterdir())
     assert sum(len(pq.read_table(file)) for file in files) == 3
+    written = [file.stat().st_mtime_ns for file in files]
+    for more in ((), ("--parquet",)):  # nothing is added
+        given = (*options, *more)
+        code, text = run("gelsight-mini-ideal", "--out", str(folder), "--count", "3", *given)
+        assert code == 0 and "written again" not in text
+        assert [file.stat().st_mtime_ns for file in files] == written
+    files[0].write_bytes(b"cut off")
+    code, text = run("gelsight-mini-ideal", "--out", str(folder), "--count", "3", *options)
+    assert "written again" in text
+    assert sum(len(pq.read_table(file)) for file in files) == 3
     card = yaml.safe_load((folder / "README.md").read_text("utf-8").split("---")[1])
     named = [each["path"] for each in card["configs"][0]["data_files"]]
     assert sorted(file for path in named for file in folder.glob(path)) == files
