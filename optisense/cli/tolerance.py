@@ -164,8 +164,9 @@ def print_tolerance(found: Tolerance, usual: bool) -> None:
         output.print(f"{count} of {found.sensors} sensors fail: {reason}")
     if usual:
         output.print(
-            "the camera and the positions of parts were taken as exact; to include them, give all "
-            "errors, such as --error camera.position.z=0.1 --error lights.position=0.1"
+            "the camera and the positions of parts were taken as exact. --error replaces the usual "
+            "errors: give all that matter, such as --error camera.position.z=0.1 "
+            "--error lights.position=0.1"
         )
 
 
