@@ -162,8 +162,8 @@ def _describe(design: SensorDesign) -> int:
         else:
             if is_hollow(design):
                 output.print(
-                    "            nothing holds the back of the gel under most of its skin "
-                    "(hollow): forces are those of a gel held all over its back, and too large"
+                    "            most of the gel has air behind it; forces are computed as if its "
+                    "whole back were fixed, and are too large"
                 )
             if limits := rims_in_words(design):
                 output.print(f"            {limits}")
