@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -85,11 +86,12 @@ class RobustEvaluator:
             parts[CONDITIONS] = {
                 str(each): json_ready(_reached(each, found)) for each in self.usual.requirements
             }
-        failure = None
-        if Outcome(scores, parts=parts).unmeasured:
-            reasons = [outcome.failure for outcome in found if outcome.failure]
-            failure = f"{len(reasons)} of {len(found)} manufactured sensors fail: {reasons[0]}"
-        return Outcome(scores, failure, parts, time.perf_counter() - began)
+        outcome = Outcome(scores, None, parts, time.perf_counter() - began)
+        if not outcome.unmeasured:
+            return outcome
+        reasons = [each.failure for each in found if each.failure]
+        failure = f"{len(reasons)} of {len(found)} manufactured sensors fail: {reasons[0]}"
+        return replace(outcome, failure=failure)
 
     def _errors(self, bound: BoundManufacturingErrors) -> FloatArray:
         """Return the errors (samples, d), the same for designs with as many erroneous values."""
