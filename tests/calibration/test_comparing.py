@@ -391,7 +391,7 @@ def test_readers_that_see_no_curvature_are_told_in_words(
 
 
 def test_seven_presses_tell_what_readers_of_the_photographs_alone_achieve(
-    mini: OpticalModel,
+    mini: OpticalModel, likeness: Comparison
 ) -> None:
     """Whatever the model's pictures are, which here are the photographs themselves."""
     places = [(x, y) for x in (-4.0, 0.0, 4.0) for y in (-3.0, 3.0)] + [(1.0, 0.0)]
@@ -407,7 +407,11 @@ def test_seven_presses_tell_what_readers_of_the_photographs_alone_achieve(
     rays, axes = mini.chief_rays(SMALL), mini.design.camera.axes()
     read = cross_readings(taken, seen, shown, rays, axes, 1.0)
     assert len(read) == len(places)
-    alone = np.array([(each.radius_alone, each.degrees_alone) for each in read], dtype=float)
-    radius, degrees = np.median(alone, axis=0)
+    found = replace(likeness.realism, readings=read)
+    radius, degrees = (found.median_reading(f"{name}_alone") for name in ("radius", "degrees"))
     assert radius == pytest.approx(1.0, abs=0.15)
     assert degrees < 8.0
+    assert reading_lines(found)[2] == (
+        f"a reader calibrated on the photographs reads the balls of other photographs {radius:.2f} "
+        f"times as large as they are, and normals with an error of {degrees:.1f} degrees"
+    )
