@@ -23,13 +23,15 @@ TEMPORARY = re.compile(r"\..+\.(?P<process>[0-9]{1,9})-[0-9a-f]{8}(\.[^.]+)?")
 FREE_SPACE = "Free space on this disk or choose another folder"
 
 
-def remedy(error: OSError, hint: str | None = None) -> str:
-    """Return the remedy for an error of writing: to free space on a full disk, else the caller's or
-    the one for its reason. On a full disk a caller's hint that begins with `FREE_SPACE` is kept.
+def remedy(error: OSError, hint: str | None = None, kept: str | None = None) -> str:
+    """Return the remedy for an error of writing: to free space on a full disk, else the caller's
+    `hint` or the one for its reason; and `kept`, a sentence on what is not lost.
     """
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return hint if hint is not None and hint.startswith(FREE_SPACE) else FREE_SPACE
-    return hint or OutputError.of(error).hint or "Choose another folder"
+        found = FREE_SPACE
+    else:
+        found = hint or OutputError.of(error).hint or "Choose another folder"
+    return found if kept is None else f"{found}. {kept}"
 
 
 def inside(folder: Path, relative: str) -> Path:
@@ -63,7 +65,9 @@ def inside(folder: Path, relative: str) -> Path:
 
 
 @contextmanager
-def written_together(what: str, hint: str | None = None) -> Iterator[Callable[[Path], Path]]:
+def written_together(
+    what: str, hint: str | None = None, kept: str | None = None
+) -> Iterator[Callable[[Path], Path]]:
     """Context for files that appear all at once, when the block has ended without an error.
 
     Yields:
@@ -74,6 +78,7 @@ def written_together(what: str, hint: str | None = None) -> Iterator[Callable[[P
         what: word for the files in messages, such as "the design".
         hint: remedy if it fails for another reason than a full disk (see `remedy`); by default, the
             one for the reason.
+        kept: sentence that follows the remedy, on what is not lost.
 
     Raises:
         OutputError: in place of any `OSError`; no temporary file is left behind.
@@ -96,7 +101,7 @@ def written_together(what: str, hint: str | None = None) -> Iterator[Callable[[P
         raise OutputError(
             f"{what} can't be written: {error.strerror or error}",
             where=names.get(named, named) or None,
-            hint=remedy(error, hint),
+            hint=remedy(error, hint, kept),
         ) from error
     finally:
         for temporary, _ in staged:
@@ -141,13 +146,15 @@ def _temporary(path: Path) -> Path:
 
 
 @contextmanager
-def written_whole(path: Path, what: str = "the file", hint: str | None = None) -> Iterator[Path]:
+def written_whole(
+    path: Path, what: str = "the file", hint: str | None = None, kept: str | None = None
+) -> Iterator[Path]:
     """Context for one file, as `written_together`; yields the temporary path to write to.
 
     Raises:
         OutputError: see `written_together`.
     """
-    with written_together(what, hint) as stage:
+    with written_together(what, hint, kept) as stage:
         yield stage(path)
 
 

@@ -84,7 +84,9 @@ def test_the_remedy_fits_the_reason(tmp_path: Path) -> None:
     assert remedy(OSError(errno.EIO, "broken")) == "Choose another folder"
     for code in (errno.ENOSPC, errno.EDQUOT):
         assert remedy(OSError(code, "full"), "Name a folder of yours") == FREE_SPACE
-        assert remedy(OSError(code, "full"), f"{FREE_SPACE}; 2 remain") == f"{FREE_SPACE}; 2 remain"
+        assert remedy(OSError(code, "full"), kept="2 remain") == f"{FREE_SPACE}. 2 remain"
+    assert "2 remain" in remedy(OSError(errno.EACCES, "no"), kept="2 remain")
+    assert FREE_SPACE not in remedy(OSError(errno.EACCES, "no"), kept="2 remain")
     assert remedy(OSError(errno.EACCES, "no"), "Name a folder of yours") == "Name a folder of yours"
 
 

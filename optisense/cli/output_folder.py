@@ -10,6 +10,7 @@ from optisense.cli.console import on_exit
 from optisense.earlier_results import refuse_to_replace
 from optisense.errors import OutputError
 from optisense.folders import hold
+from optisense.writing import remedy
 
 
 def take_folder(
@@ -54,5 +55,5 @@ def ensure_writable(folder: Path) -> None:
         raise OutputError(
             f"the output folder can't be written: {error.strerror or error}",
             where=str(folder),
-            hint="Choose another folder after --out, or free space on this disk",
+            hint=remedy(error, "Choose another folder after --out"),
         ) from error

@@ -27,7 +27,7 @@ from optisense.mechanics import CONFORMING
 from optisense.mechanics.skins import refuse_drags
 from optisense.optics.estimators import RADIANCE_CACHE, current_name
 from optisense.reading.camera_noise import add_camera_noise
-from optisense.tasks._records import KEPT, CsvTable, read_object, refuse_differences
+from optisense.tasks._records import CsvTable, read_object, refuse_differences
 from optisense.tasks._regression import FOLDS, ForestReading, read_by_forest
 from optisense.tasks._sample_settings import SampleRendering
 from optisense.tasks._snr import NEIGHBOURS, signal_to_noise
@@ -323,7 +323,7 @@ def _open_table(
         kept.setdefault("skin", CONFORMING)
         refuse_differences("samples", folder, before, now)
     else:
-        write_json(folder / SETTINGS, now, "the results", KEPT)
+        write_json(folder / SETTINGS, now, "the results")
     return CsvTable(folder / SAMPLES, names)
 
 

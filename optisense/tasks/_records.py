@@ -18,16 +18,16 @@ from optisense.design.difference import plain_differences
 from optisense.design.problems import listed
 from optisense.errors import OutputError, TaskError
 from optisense.untrusted_files import COPY_AGAIN, read_json, read_table
-from optisense.writing import FREE_SPACE, written_whole
+from optisense.writing import remedy, written_whole
 
-KEPT = f"{FREE_SPACE}; finished samples are kept"
+KEPT = "Finished samples are kept"
 
 
 def write_whole(path: Path, writer: Callable[[Path], object]) -> None:
     """Call `writer` to write a file under a temporary name beside `path`, then rename it; a file
     that cannot be written raises OutputError.
     """
-    with written_whole(path, "the results", KEPT) as temporary:
+    with written_whole(path, "the results", kept=KEPT) as temporary:
         writer(temporary)
 
 
@@ -123,5 +123,7 @@ def _line(values: Sequence[str]) -> str:
 
 def _cannot_write(path: Path, error: OSError) -> OutputError:
     return OutputError(
-        f"the results can't be written: {error.strerror or error}", where=str(path), hint=KEPT
+        f"the results can't be written: {error.strerror or error}",
+        where=str(path),
+        hint=remedy(error, kept=KEPT),
     )

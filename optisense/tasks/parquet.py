@@ -121,7 +121,7 @@ def write_parquet(
             progress(done, len(dataset))
 
     with held(dataset.folder):
-        with written_together("the results", KEPT) as stage:
+        with written_together("the results", kept=KEPT) as stage:
             for split in SPLITS:
                 numbers = [
                     k for k, row in enumerate(dataset.labels) if (row["split"] or TRAIN) == split

@@ -17,6 +17,7 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 
 from optisense.errors import OptiSenseError, OutputError, SearchError
+from optisense.writing import FREE_SPACE
 
 Stamp = tuple[int, int, int]
 """Time of change (ns) and size (bytes) of the file, and size (bytes) of its write-ahead log."""
@@ -27,7 +28,7 @@ which a database in memory can have.
 """
 
 REMEDIES = {
-    "disk I/O error": "The disk is full, was disconnected or fails: free space on it and check it",
+    "disk I/O error": f"The disk is full, was disconnected or fails: check it. {FREE_SPACE}",
     "unable to open": "Check that the file may be read, and its folder be written to for a search",
     "readonly": "Copy the study to a folder that may be written to",
     "locked": "End the other program that has the file open",
@@ -131,7 +132,7 @@ def _error(error: Exception, path: Path | None) -> OptiSenseError:
         # SQLite also reports pages with impossible content like this.
         return damaged("the study's store", path, text or "its pages have no valid content")
     if "full" in text:
-        return OutputError("the disk is full", where=where, hint="Free some space on it")
+        return OutputError("the disk is full", where=where, hint=FREE_SPACE)
     if any(sign in text for sign in ("not a database", "malformed", "no such table")):
         return SearchError(
             f"this is not a study's store, or it is damaged: {text}",
