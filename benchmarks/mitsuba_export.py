@@ -24,11 +24,10 @@ from optisense.optics.scene.surfaces import CLEAR, Surface, SurfaceKind
 Colour = tuple[float, float, float]
 
 PATH_DEPTH = 256
-"""Largest number of surfaces of a path in the exported scene. Russian roulette ends most paths long
-before, so that a large limit hardly takes time. A mirroring skin and the faces of a slab guide
-light: on the skin of an acrylic slab at a specularity of 1, seen at 43 degrees, paths of more than
-32 surfaces carry 5 % of the light of the lamps beside the view, and paths of more than 64 surfaces
-0.4 %."""
+"""Largest number of surfaces of a path in the exported scene. A mirroring skin and the faces of a
+slab guide light on longer paths than one expects; docs/validation.md states what these carry.
+Russian roulette ends most paths long before: on GelSight Mini, a limit of 32 takes the same time
+within the 5 % by which repeated measurements differ."""
 
 SPOT_PIXELS = 512
 """Side (pixels) of the bitmap that holds the profile of a spot light. With 512, a pixel of a spot
