@@ -29,6 +29,7 @@ from optisense.geometry._flat_polygons import (
     lie_apart,
 )
 from optisense.geometry.mesh import TriangleMesh
+from optisense.geometry.shading_normals import shaded
 
 PARALLEL = float(np.cos(np.radians(10.0)))
 """Smallest cosine between the normals of coincident faces (10 degrees); faces of two tessellations
@@ -179,10 +180,10 @@ def cut(mesh: TriangleMesh, overlays: list[Overlay]) -> list[TriangleMesh]:
     that nothing covers; where several overlays overlap, the first one counts.
 
     Together the parts form the mesh; completely covered or free faces are kept, others are cut.
-    Shading normals are kept, and a deformed mesh gets those of its shape before the cut, as in
-    `solids.cut_out`.
+    Shading normals are those of the whole mesh: after the cut, its creases and its shape at rest
+    would no longer be known.
     """
-    state = _Remainder(mesh if mesh.rest is None else mesh.vertex_normals())
+    state = _Remainder(shaded(mesh))
     return [*(state.take(overlay) for overlay in overlays), state.rest()]
 
 

@@ -26,6 +26,23 @@ SAME_NORMAL = 1e-6
 """Difference between the components of unit normals below which corners of a vertex share it: far
 above the rounding of double precision, and an angle of 6e-5 degrees."""
 
+FLAT = 1e-6
+"""Largest difference between the components of corner and face normals (unit vectors) at which a
+mesh has flat facets: far above the rounding of normals in double precision (1e-15), and an angle of
+only 6e-5 degrees."""
+
+
+def shaded(mesh: TriangleMesh) -> TriangleMesh:
+    """Return a mesh with shading normals: its own or, without any, `vertex_normals`."""
+    return mesh if mesh.normals is not None else mesh.vertex_normals()
+
+
+def is_flat(mesh: TriangleMesh) -> bool:
+    """Return whether the shading normals of a mesh are those of its faces."""
+    assert mesh.normals is not None
+    corners = mesh.normals[mesh.faces] - mesh.face_normals[:, None]
+    return bool(np.abs(corners).max() < FLAT)
+
 
 def smooth_corners(
     mesh: TriangleMesh,

@@ -14,6 +14,7 @@ from optisense.geometry.containment import inside
 from optisense.geometry.mesh import TriangleMesh
 from optisense.geometry.overlaps import CONTACT, find_overlap
 from optisense.geometry.patches import patches
+from optisense.geometry.shading_normals import shaded
 
 Places = weakref.WeakKeyDictionary[TriangleMesh, FloatArray | None]
 Rests = weakref.WeakKeyDictionary[TriangleMesh, TriangleMesh | None]
@@ -67,16 +68,12 @@ def of_manifold(solid: Any) -> TriangleMesh:
 
 
 def cut_out(mesh: TriangleMesh, tool: TriangleMesh) -> TriangleMesh:
-    """Return a closed mesh without the space that it shares with another one, which may be empty.
+    """Return a closed mesh without the space that it shares with another one; nothing may be left.
 
-    Shading normals are kept, and a deformed mesh gets those of its shape before the cut, after
-    which its shape at rest would no more be known.
+    Shading normals are those of the whole mesh, as in `coincidence.cut`; faces of the cut have
+    those of the other one.
     """
-    if mesh.normals is None and mesh.rest is None:
-        return of_manifold(as_manifold(mesh) - as_manifold(tool))
-    first, second = (
-        each if each.normals is not None else each.vertex_normals() for each in (mesh, tool)
-    )
+    first, second = shaded(mesh), shaded(tool)
     assert first.normals is not None and second.normals is not None
     solid = _with_properties(first, first.normals) - _with_properties(second, -second.normals)
     cut = solid.to_mesh64()

@@ -9,6 +9,8 @@ import shapely
 from optisense.geometry import TriangleMesh
 from optisense.geometry._flat_polygons import area_and_length, common
 from optisense.geometry.coincidence import cut, find_coincident, sample_seam
+from optisense.geometry.shading_normals import shaded
+from optisense.geometry.solids import cut_out
 
 SIDES = 96
 
@@ -60,3 +62,22 @@ def test_the_seam_of_a_small_solid_on_a_large_one_is_measured_in_either_order() 
         seam = sample_seam(one, other, 0.05)
         assert len(seam.heights) * seam.area == pytest.approx(25.0, rel=0.02)
         np.testing.assert_allclose(seam.heights, 0.02, atol=1e-9)
+
+
+def test_pieces_keep_the_edges_of_the_whole_mesh_smooth() -> None:
+    """An edge between two facets, without the next ones of its curve, would be a crease."""
+    block = TriangleMesh.box((-10, -5, 0), (10, 5, 1), (8, 1, 1))
+    x, y, z = block.vertices.T
+    arch = block.with_vertices(np.column_stack([x, y, z * (4 - 0.02 * x**2)]))
+    middle = arch.triangles.mean(axis=1)
+    beside = (np.abs(middle[:, 0]) > 2.5) & (middle[:, 2] > 1)
+    sheet = arch.with_faces(arch.faces[beside]).compacted()
+    rest = cut(arch, [find_coincident(arch, sheet, 0.002, facing=False)])[-1]
+    sides = [TriangleMesh.box((-11, -6, -1), (-2, 6, 5)), TriangleMesh.box((2, -6, -1), (11, 6, 5))]
+    for piece in (rest, cut_out(arch, TriangleMesh.joined(sides))):
+        found = shaded(piece)
+        assert found.normals is not None
+        ridge = (np.abs(found.vertices[:, 0]) < 1e-6) & (found.vertices[:, 2] > 3.9)
+        upward = found.normals[ridge & (found.normals[:, 2] > 0.5)]
+        assert len(upward) >= 2
+        np.testing.assert_allclose(upward, np.tile([0.0, 0.0, 1.0], (len(upward), 1)), atol=1e-6)

@@ -131,6 +131,20 @@ def test_shading_normals_live_on_in_cut_faces() -> None:
             np.testing.assert_allclose(np.linalg.norm(face.mesh.normals, axis=1), 1.0)
 
 
+def test_a_touching_solid_with_split_vertices_but_without_normals_is_curved() -> None:
+    block = box((-10, -5, 0), (10, 5, 1), (8, 1, 1))
+    x, y, z = block.vertices.T
+    arch = block.with_vertices(np.column_stack([x, y, z * (4 - 0.02 * x**2)]))
+    normals = np.round(arch.face_normals, 6)
+    facets = [np.flatnonzero((normals == each).all(axis=1)) for each in np.unique(normals, axis=0)]
+    split = TriangleMesh.joined([arch.with_faces(arch.faces[each]).compacted() for each in facets])
+    beside = Solid("plate", box((-10, -5, -1), (10, 5, 0)), "acrylic", ACRYLIC)
+    interfaces = Media([Solid("arch", split, "silicone", GEL), beside]).interfaces
+    outside = next(face.mesh for face in interfaces if face.names == ("arch",))
+    piece = AssemblyCache().piece("arch", outside, Surface(SurfaceKind.MIRROR), merge=True)
+    assert piece.normals is not None
+
+
 @pytest.mark.parametrize("top", [0.0, 1.0], ids=["touching", "overlapping"])
 def test_solids_beside_others_keep_their_creases_and_normals(top: float) -> None:
     block = box((-6, -5, 0), (6, 5, 1), (4, 4, 2))

@@ -16,6 +16,7 @@ from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.coplanar import merge_coplanar
+from optisense.geometry.shading_normals import is_flat, shaded
 from optisense.optics.scene._finishes import ShapeCache, finishes_of, frosted
 from optisense.optics.scene._lamp_places import off_faces, window, with_media
 from optisense.optics.scene._sheets import media_beside, split_by_media
@@ -28,11 +29,6 @@ from optisense.optics.scene.surfaces import RGB, Region, Surface, SurfaceKind
 SMOOTH_METAL = 0.01
 """GGX roughness below which a metal is an ideal mirror. With 0.01, half of the micro-facets tilt by
 less than 0.6 degrees, so that reflections blur by about one degree."""
-
-FLAT = 1e-6
-"""Largest difference between the components of corner and face normals (unit vectors) at which a
-mesh has flat facets: far above the rounding of normals in double precision (1e-15), and an angle of
-only 6e-5 degrees."""
 
 
 @dataclass(frozen=True)
@@ -289,13 +285,13 @@ def _merged(mesh: TriangleMesh) -> TriangleMesh:
     """Return a mesh with flat facets merged into few triangles, which are traced faster."""
     # Only flat meshes are merged, as merging drops shading normals; a curved mesh may still have
     # flat walls.
-    if not _is_flat(_shaded(mesh)):
+    if not is_flat(shaded(mesh)):
         return mesh
     merged = merge_coplanar(mesh)
-    if _is_flat(_shaded(merged)):
+    if is_flat(shaded(merged)):
         return merged
     # Vertices that are split without normals say nothing about the edges between their faces.
-    if (mesh.rest or mesh).normals is None and not _is_flat(mesh.welded().vertex_normals()):
+    if (mesh.rest or mesh).normals is None and not is_flat(mesh.welded().vertex_normals()):
         return merged
     corners = merged.triangles.reshape(-1, 3)
     own = np.repeat(merged.face_normals, 3, axis=0)
@@ -303,21 +299,10 @@ def _merged(mesh: TriangleMesh) -> TriangleMesh:
 
 
 def _piece(name: str, mesh: TriangleMesh, surface: Surface) -> Piece:
-    smooth = _shaded(mesh)
-    if _is_flat(smooth):
+    smooth = shaded(mesh)
+    if is_flat(smooth):
         return Piece(name, mesh.vertices, mesh.faces, surface)
     return Piece(name, smooth.vertices, smooth.faces, surface, smooth.normals)
-
-
-def _shaded(mesh: TriangleMesh) -> TriangleMesh:
-    return mesh if mesh.normals is not None else mesh.vertex_normals()
-
-
-def _is_flat(mesh: TriangleMesh) -> bool:
-    """Return whether the shading normals of a mesh are those of its faces."""
-    assert mesh.normals is not None
-    corners = mesh.normals[mesh.faces] - mesh.face_normals[:, None]
-    return bool(np.abs(corners).max() < FLAT)
 
 
 def _emitters(design: SensorDesign, solids: list[Solid]) -> list[Emitter]:

@@ -29,6 +29,7 @@ from optisense.geometry.coincidence import Overlay, boxes_overlap, cut, find_coi
 from optisense.geometry.connected import connected_components
 from optisense.geometry.mesh import TriangleMesh
 from optisense.geometry.mesh_points import Anchors, anchored
+from optisense.geometry.shading_normals import is_flat, shaded
 from optisense.geometry.solids import as_manifold, cut_out, thick_place
 from optisense.optics.scene._solids import AROUND, Interface, Sheet, Solid
 
@@ -127,7 +128,7 @@ class Media:
             DesignError: solids of different index overlap and have the same priority.
         """
         self._solids = list(solids)
-        closed = [replace(s, mesh=s.mesh.validate(s.name, closed=True)) for s in solids]
+        closed = [replace(s, mesh=_whole(s.mesh.validate(s.name, closed=True))) for s in solids]
         self._parted = _disjoint(closed)
         self._lying: list[Sheet] = []
         self._loose: list[Sheet] = []
@@ -219,6 +220,15 @@ class Media:
         result.interfaces = [face for face in faces if _refracts(face)]
         result.bent = True
         return result
+
+
+def _whole(mesh: TriangleMesh) -> TriangleMesh:
+    """Return a mesh whose vertices are welded if it has no normals and flat facets only: split
+    vertices then say nothing about the edges between these.
+    """
+    welded = mesh.welded()
+    is_split = len(welded.vertices) < len(mesh.vertices) and (mesh.rest or mesh).normals is None
+    return welded if is_split and is_flat(shaded(mesh)) else mesh
 
 
 def _interface(mesh: TriangleMesh, solid: Solid, neighbour: Solid | None) -> Interface:
