@@ -29,6 +29,7 @@ from optisense.geometry._flat_polygons import (
     lie_apart,
 )
 from optisense.geometry.mesh import TriangleMesh
+from optisense.geometry.mesh_points import spread_points
 from optisense.geometry.shading_normals import shaded
 
 PARALLEL = float(np.cos(np.radians(10.0)))
@@ -137,11 +138,8 @@ def sample_seam(one: TriangleMesh, other: TriangleMesh, reach: float) -> Seam:
         return nothing
     if one.face_areas[near].sum() > other.face_areas[facing].sum():
         one, other, near, facing = other, one, facing, near
-    share = (np.arange(SEAM_SAMPLES) + 0.5) / SEAM_SAMPLES
-    sums = np.cumsum(one.face_areas[near])
-    own = near[np.searchsorted(sums, share * sums[-1])]
-    weights = np.random.default_rng(0).dirichlet(np.ones(3), SEAM_SAMPLES)
-    points = np.einsum("kc,kci->ki", weights, one.triangles[own])
+    chosen, points = spread_points(one.with_faces(one.faces[near]), SEAM_SAMPLES)
+    own = near[chosen]
     ends = points + reach * np.array([[[-1.0]], [[1.0]]]) * one.face_normals[own]
     boxes = (corner[facing] for corner in other.face_bounds)
     pairs = list(overlapping_boxes(ends.min(axis=0), ends.max(axis=0), *boxes))
@@ -161,7 +159,7 @@ def sample_seam(one: TriangleMesh, other: TriangleMesh, reach: float) -> Seam:
     first = first[np.abs(height[first]) <= reach]
     middles = points[point[first]]
     middles += 0.5 * height[first, None] * one.face_normals[own[point[first]]]
-    return Seam(height[first], middles, float(sums[-1]) / SEAM_SAMPLES)
+    return Seam(height[first], middles, float(one.face_areas[near].sum()) / SEAM_SAMPLES)
 
 
 def boxes_overlap(first: TriangleMesh, second: TriangleMesh, depth: float) -> bool:

@@ -76,6 +76,17 @@ def distance_within(mesh: TriangleMesh, point: FloatArray, reach: float) -> floa
     return float(np.linalg.norm(closest_points(part, point) - point, axis=1).min())
 
 
+def spread_points(mesh: TriangleMesh, count: int) -> tuple[NDArray[np.int64], FloatArray]:
+    """Spread a number of points over a mesh, each of which stands for an equal share of its area.
+    Return the face (count,) that each lies on, and the points (count, 3), mm, which are random
+    within their faces, but always the same.
+    """
+    sums = np.cumsum(mesh.face_areas)
+    faces = np.searchsorted(sums, (np.arange(count) + 0.5) / count * sums[-1])
+    weights = np.random.default_rng(0).dirichlet(np.ones(3), count)
+    return faces, np.einsum("kc,kci->ki", weights, mesh.triangles[faces])
+
+
 def surface_samples(
     vertices: FloatingArray, faces: NDArray[np.integer], spacing: float
 ) -> tuple[FloatingArray, NDArray[np.integer], FloatingArray]:

@@ -14,6 +14,7 @@ from optisense.design.parts import Role
 from optisense.errors import ContactError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.coincidence import boxes_overlap, find_coincident
+from optisense.geometry.mesh_points import spread_points
 from optisense.geometry.overlaps import find_overlap, touching_vertices
 from optisense.geometry.rays import GLUE, exits, ray_hits
 from optisense.mechanics._footprint import Footprint
@@ -93,24 +94,23 @@ def _overlap_at(place: Footprint, local: FloatArray) -> FloatArray:
 
 def is_attached(design: SensorDesign) -> bool:
     """Return whether any part of a design other than the skin touches its gel."""
-    gels, others = _gels_and_others(design)
+    gels, others = _gels_and_others(design, design.deformed_meshes())
     return any(_hold_each_other(gel, other) for gel in gels for other in others)
 
 
 def is_hollow(design: SensorDesign) -> bool:
     """Return whether no rigid part lies at the back of the gel under most of the skin of a design,
-    as in a hollow dome that is held at its rim only.
+    as in a hollow dome that is held at its rim only. Refracting sheets count as rigid, as they may
+    be faces of thick windows.
     """
-    gels, others = _gels_and_others(design)
     meshes = design.deformed_meshes()
+    gels, others = _gels_and_others(design, meshes)
     skins = [meshes[name] for name in design.parts_of(Role.SENSING_SURFACE)]
     if not gels or not skins:
         return False
     skin = TriangleMesh.joined(skins)
-    reached = np.cumsum(skin.face_areas)
-    steps = (np.arange(BACK_LINES) + 0.5) / BACK_LINES * reached[-1]
-    faces = np.searchsorted(reached, steps)  # each stands for an equal share of the area
-    starts, ways = skin.triangles[faces].mean(axis=1), skin.face_normals[faces]
+    faces, starts = spread_points(skin, BACK_LINES)
+    ways = skin.face_normals[faces]
     nearest = np.full(len(faces), np.inf)
     for other in others:
         hits = ray_hits(other, starts, ways)
@@ -119,9 +119,10 @@ def is_hollow(design: SensorDesign) -> bool:
     return bool(np.count_nonzero(free) > BACK_LINES / 2)
 
 
-def _gels_and_others(design: SensorDesign) -> tuple[list[TriangleMesh], list[TriangleMesh]]:
-    """Return the gels of a design, and the parts that may hold them, mm."""
-    meshes = design.deformed_meshes()
+def _gels_and_others(
+    design: SensorDesign, meshes: dict[str, TriangleMesh]
+) -> tuple[list[TriangleMesh], list[TriangleMesh]]:
+    """Return the gels of a design among its meshes, and the parts that may hold them, mm."""
     gels = [meshes[name] for name in design.parts_of(Role.ELASTOMER)]
     others = [
         meshes[name]

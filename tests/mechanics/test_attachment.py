@@ -59,6 +59,21 @@ def test_a_gel_is_hollow_where_its_support_leaves_most_of_its_back_free(width, f
     assert is_hollow(design) is free
 
 
+@pytest.mark.parametrize("hollow", [True, False])
+def test_a_skin_of_two_triangles_is_judged_by_all_of_it(hollow):
+    """Two strips under the middles of the triangles hold a quarter, or all but these strips."""
+    design = loose(0.0)
+    (x0, y0, z0), (x1, y1, z1) = design.meshes["plate"].bounds
+    design.meshes["skin"] = TriangleMesh.grid((x1 - x0, y1 - y0)).flipped()
+    left, right = sorted(design.meshes["skin"].triangles.mean(axis=1)[:, 0])
+    held = [(left - 1.5, left + 1.5), (right - 1.5, right + 1.5)]
+    if not hollow:
+        held = [(x0, left - 1.5), (left + 1.5, right - 1.5), (right + 1.5, x1)]
+    strips = [TriangleMesh.box((low, y0, z0), (high, y1, z1)) for low, high in held]
+    design.meshes["plate"] = TriangleMesh.joined(strips)
+    assert is_hollow(design) is hollow
+
+
 def test_a_loose_gel_takes_a_conforming_contact_only():
     model = RayModel(loose(1.0))
     ball = Contact(Sphere(1.5), at=(0.0, 0.0), depth=0.5)
