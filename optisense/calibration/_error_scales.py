@@ -58,6 +58,11 @@ averaged: there is only one sample of it, and shadows, where it changes, are abo
 """
 
 
+Pixels = NDArray[np.bool_] | slice
+"""Pixels of a picture (h, w) that are compared: a mask (h, w), or a slice of rows, so that all
+pixels need no copy."""
+
+
 @dataclass(frozen=True)
 class ErrorScale:
     """Errors of a set of pictures, relative to those that are expected from noise.
@@ -76,21 +81,22 @@ class ErrorScale:
         return all(abs(one - two) < SCALE_CHANGE * two for one, two in pairs)
 
 
-def correlated_pixels(errors: Sequence[FloatArray], masks: Sequence[NDArray[np.bool_]]) -> float:
+def correlated_pixels(errors: Sequence[FloatArray], masks: Sequence[Pixels]) -> float:
     """Return the number of pixels for which there is one independent error, 1 or more, from errors
-    (h, w, 3) of pictures and masks (h, w) of the pixels that count.
+    (h, w, 3) of pictures and the pixels that count in each.
 
     It is the sum of the correlation over all displacements, up to the distance at which the mean
     over the directions falls below 0.1, and at most a fifth of the picture's width.
     """
-    height, width = masks[0].shape
+    height, width = errors[0].shape[:2]
     shape = next_fast_len(2 * height, real=True), next_fast_len(2 * width, real=True)
     products, pairs = np.zeros(shape), np.zeros(shape)
     for error, mask in zip(errors, masks, strict=True):
-        inside = np.where(mask[..., None], error, 0.0)
+        inside, counts = np.zeros_like(error), np.zeros((height, width))
+        inside[mask], counts[mask] = error[mask], 1.0
         for channel in range(inside.shape[-1]):
             products += irfft2(np.abs(rfft2(inside[..., channel], shape)) ** 2, shape)
-        pairs += inside.shape[-1] * irfft2(np.abs(rfft2(mask.astype(float), shape)) ** 2, shape)
+        pairs += inside.shape[-1] * irfft2(np.abs(rfft2(counts, shape)) ** 2, shape)
     if products[0, 0] <= 0.0:
         return 1.0
     known = pairs > 0.5
@@ -110,11 +116,11 @@ def correlated_pixels(errors: Sequence[FloatArray], masks: Sequence[NDArray[np.b
 
 def error_scale(
     errors: Sequence[FloatArray],
-    masks: Sequence[NDArray[np.bool_]],
+    masks: Sequence[Pixels],
     pixels: float | None = None,
 ) -> ErrorScale:
-    """Return the scale of errors (h, w, 3), relative to the expected ones, at the pixels of masks
-    (h, w), unaffected by dust.
+    """Return the scale of errors (h, w, 3), relative to the expected ones, at the pixels of masks,
+    unaffected by dust.
 
     Errors above `HUBER` are reduced to it in the estimate of their correlation, which is made if
     the number of pixels for one independent error is None.
@@ -154,11 +160,11 @@ class Scales:
     def of_errors(
         errors: Sequence[FloatArray],
         expected: Sequence[FloatArray],
-        masks: Sequence[NDArray[np.bool_]],
+        masks: Sequence[Pixels],
         pixels: float | None,
     ) -> Scales:
         """Return the scales of errors (h, w, 3) of the background and of each response, levels, at
-        the pixels of masks (h, w); `pixels` is that of `LayeredFit`.
+        the pixels of masks; `pixels` is that of `LayeredFit`.
         """
         ground, *pressed = (error / own for error, own in zip(errors, expected, strict=True))
         return Scales(

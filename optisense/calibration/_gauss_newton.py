@@ -22,7 +22,7 @@ from scipy.ndimage import gaussian_filter
 
 from optisense.array_types import FloatArray
 from optisense.calibration._covered_view import outline_of, with_smooth_outline
-from optisense.calibration._error_scales import HUBER, Scales, expected_errors
+from optisense.calibration._error_scales import HUBER, Pixels, Scales, expected_errors
 from optisense.calibration._far_field import without_drift
 from optisense.calibration._least_squares import (
     LinearEquations,
@@ -145,7 +145,7 @@ class LayeredFit:
             without_drift(self._compared(press.picture) - self._real, distance)
             for press, distance in zip(photographs.presses, away, strict=True)
         ]
-        self._masks = [np.ones(shape, dtype=bool), *(distance <= NEAR for distance in away)]
+        self._masks: list[Pixels] = [slice(None), *(distance <= NEAR for distance in away)]
         scale = shape[1] / 320.0
         self._contact_spread = np.array(CONTACT_SPREAD) * (scale, scale, 1.0)
         self._contact_slopes = [
@@ -316,7 +316,7 @@ class LayeredFit:
 
     def _root_mean_square(self, pictures: list[FloatArray], index: int) -> float:
         """Return the root mean square of the error of the background or near a contact, levels."""
-        error = self._compared_pixels(self._error(pictures, index), index)
+        error = self._error(pictures, index)[self._masks[index + 1]]
         return float(np.sqrt((error**2).mean()))
 
     def _scales(self, point: _Point) -> Scales:
@@ -337,16 +337,12 @@ class LayeredFit:
         return [ground] + [each - ground for each in pressed]
 
     def _residuals(self, pictures: list[FloatArray], index: int, scales: Scales) -> FloatArray:
-        """Return the residuals (k, 3) of the background (index -1), or those near a contact."""
-        size = scales.of(index).size * scales.expected[index + 1]
-        error = self._error(pictures, index)
-        return self._compared_pixels(error, index) / self._compared_pixels(size, index)
-
-    def _compared_pixels(self, values: FloatArray, index: int) -> FloatArray:
-        """Return the values (k, 3) of the k pixels of a picture (h, w, 3) that are compared: all of
-        the background, without a copy, or those near a contact.
+        """Return the residuals (h, w, 3) of the background (index -1), or those (k, 3) of the k
+        pixels near a contact.
         """
-        return values.reshape(-1, 3) if index < 0 else values[self._masks[index + 1]]
+        size = scales.of(index).size * scales.expected[index + 1]
+        mask = self._masks[index + 1]
+        return np.asarray(self._error(pictures, index)[mask] / size[mask])
 
     def _cost(self, point: _Point, scales: Scales) -> float:
         total = float((self._prior(point) ** 2).sum())

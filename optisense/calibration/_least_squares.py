@@ -2,7 +2,7 @@
 
 Linear equations of a picture are: the indices of the n unknowns on which they depend, the
 derivatives (k, 3, n) of the residuals, their weights (k, 3), the residuals (k, 3), and the mask
-(h, w) of the k pixels.
+(h, w) of the k pixels. The background has (h, w) in place of (k), and a slice of all rows as mask.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.array_types import FloatArray
+from optisense.calibration._error_scales import Pixels
 
-LinearEquations = tuple[list[int], FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]
+LinearEquations = tuple[list[int], FloatArray, FloatArray, FloatArray, Pixels]
 
 SIGNAL = 0.5
 """Smallest share of a slope's energy that is no noise, beyond what other numbers explain; a slope

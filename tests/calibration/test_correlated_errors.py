@@ -29,6 +29,7 @@ def test_smoothed_noise_is_correlated_over_the_area_of_its_filter(deviation: flo
     everywhere = np.ones(SIZE, bool)
     found = correlated_pixels([noise(deviation)], [everywhere])
     assert found == pytest.approx(expected, rel=0.15)
+    assert correlated_pixels([noise(deviation)], [slice(None)]) == found
     rows, columns = np.mgrid[: SIZE[0], : SIZE[1]]
     disc = np.hypot(rows - 120, columns - 160) < 90  # as of the pixels around a contact
     assert correlated_pixels([noise(deviation)], [disc]) == pytest.approx(expected, rel=0.3)
